@@ -1,0 +1,18 @@
+//! Curves and surfaces: B-splines of any degree, polynomial and rational.
+//!
+//! [`Curve`] and [`Surface`] are validated when they are made; every function after that is total.
+//! Knot refinement, splitting, Bezier extraction and degree elevation are one mechanism, the blossom
+//! ([`blossom`]).
+
+mod aabb;
+mod bezier;
+pub mod blossom;
+mod curve;
+mod knots;
+mod surface;
+
+pub use aabb::Aabb;
+pub use bezier::BezierPatch;
+pub use curve::{Curve, CurveError};
+pub use knots::{Basis, KnotError, Knots, MAX_DEGREE, MAX_DERIVATIVE};
+pub use surface::{Direction, Side, Surface, SurfaceError, SurfaceJet};

@@ -1,0 +1,6 @@
+//! Geometry and algorithms: plain functions over plain data, `f64`, no files, no window.
+
+pub mod geom;
+pub mod job;
+pub mod num;
+pub mod tol;

@@ -1,0 +1,1 @@
+//! Small numerics that the geometry stands on.

@@ -1,0 +1,202 @@
+//! Documents: immutable sets of entities, cheap to clone. Undo is a stack of documents.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use crate::kernel::geom::{Aabb, Curve, Surface};
+use crate::kernel::tol::Tolerances;
+
+/// Names one entity for the life of a document, whatever is added or removed around it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct EntityId(pub u64);
+
+/// The unit of all lengths of a document.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Unit {
+    /// The file named none, or one without a metric meaning.
+    #[default]
+    Unknown,
+    /// Inches.
+    Inch,
+    /// Millimetres.
+    Millimetre,
+    /// Feet.
+    Foot,
+    /// Miles.
+    Mile,
+    /// Metres.
+    Metre,
+    /// Kilometres.
+    Kilometre,
+    /// Thousandths of an inch.
+    Mil,
+    /// Micrometres.
+    Micrometre,
+    /// Centimetres.
+    Centimetre,
+    /// Millionths of an inch.
+    Microinch,
+}
+
+impl Unit {
+    /// The short name that is written behind a length, empty when unknown.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Self::Unknown => "",
+            Self::Inch => "in",
+            Self::Millimetre => "mm",
+            Self::Foot => "ft",
+            Self::Mile => "mi",
+            Self::Metre => "m",
+            Self::Kilometre => "km",
+            Self::Mil => "mil",
+            Self::Micrometre => "um",
+            Self::Centimetre => "cm",
+            Self::Microinch => "uin",
+        }
+    }
+}
+
+/// The shape of an entity.
+#[derive(Clone, Debug)]
+pub enum Shape {
+    /// A surface of the model.
+    Surface(Arc<Surface>),
+    /// A free curve of the model.
+    Curve(Arc<Curve>),
+    /// A healed patch: its surface, how it was asked for, and the evidence.
+    Patch(Arc<Patch>),
+}
+
+/// A healed patch as the document keeps it.
+#[derive(Clone, Debug)]
+pub struct Patch {
+    /// The B-spline surface (bicubic, C1, double interior knots).
+    pub surface: Arc<Surface>,
+    /// What it was made from; running it again gives the same surface.
+    pub spec: super::spec::PatchSpec,
+    /// What was measured.
+    pub report: super::spec::PatchReport,
+}
+
+/// One thing in a document.
+#[derive(Clone, Debug)]
+pub struct Entity {
+    /// Its name for programs.
+    pub id: EntityId,
+    /// Its name for people.
+    pub name: String,
+    /// What it is.
+    pub shape: Shape,
+    /// Whether it is drawn.
+    pub visible: bool,
+    /// The colour that the file or the user gave it, linear RGB.
+    pub color: Option<[f32; 3]>,
+}
+
+impl Entity {
+    /// The surface of a surface or patch.
+    pub fn surface(&self) -> Option<&Arc<Surface>> {
+        match &self.shape {
+            Shape::Surface(surface) => Some(surface),
+            Shape::Patch(patch) => Some(&patch.surface),
+            Shape::Curve(_) => None,
+        }
+    }
+
+    /// The curve of a curve.
+    pub fn curve(&self) -> Option<&Arc<Curve>> {
+        match &self.shape {
+            Shape::Curve(curve) => Some(curve),
+            _ => None,
+        }
+    }
+
+    /// A box around it.
+    pub fn bounds(&self) -> Aabb {
+        match &self.shape {
+            Shape::Surface(surface) => surface.bounds(),
+            Shape::Curve(curve) => curve.bounds(),
+            Shape::Patch(patch) => patch.surface.bounds(),
+        }
+    }
+}
+
+/// A set of entities. Cloning costs a few pointers.
+#[derive(Clone, Debug, Default)]
+pub struct Document {
+    entities: Arc<Vec<Arc<Entity>>>,
+    /// The unit of all lengths.
+    pub unit: Unit,
+    next_id: u64,
+}
+
+impl Document {
+    /// An empty document.
+    pub fn new(unit: Unit) -> Self {
+        Self { unit, ..Self::default() }
+    }
+
+    /// All entities, in file order.
+    pub fn entities(&self) -> &[Arc<Entity>] {
+        &self.entities
+    }
+
+    /// The entity with this id.
+    pub fn get(&self, id: EntityId) -> Option<&Arc<Entity>> {
+        self.entities.iter().find(|e| e.id == id)
+    }
+
+    /// The original surfaces in file order: a surface's number on the command line is its place here.
+    pub fn surfaces(&self) -> impl Iterator<Item = (EntityId, &Arc<Surface>)> {
+        self.entities.iter().filter_map(|e| match &e.shape {
+            Shape::Surface(surface) => Some((e.id, surface)),
+            _ => None,
+        })
+    }
+
+    /// The free curves in file order: `Curve(id)` of a patch specification counts these.
+    pub fn curves(&self) -> impl Iterator<Item = (EntityId, &Arc<Curve>)> {
+        self.entities.iter().filter_map(|e| e.curve().map(|c| (e.id, c)))
+    }
+
+    /// The healed patches.
+    pub fn patches(&self) -> impl Iterator<Item = (EntityId, &Arc<Patch>)> {
+        self.entities.iter().filter_map(|e| match &e.shape {
+            Shape::Patch(patch) => Some((e.id, patch)),
+            _ => None,
+        })
+    }
+
+    /// Adds a visible entity and says which id it got.
+    pub fn add(&mut self, name: impl Into<String>, shape: Shape, color: Option<[f32; 3]>) -> EntityId {
+        let id = EntityId(self.next_id);
+        self.next_id += 1;
+        let entity = Entity { id, name: name.into(), shape, visible: true, color };
+        Arc::make_mut(&mut self.entities).push(Arc::new(entity));
+        id
+    }
+
+    /// Keeps only the entities for which `keep` is true.
+    pub fn retain(&mut self, keep: impl Fn(&Entity) -> bool) {
+        Arc::make_mut(&mut self.entities).retain(|e| keep(e));
+    }
+
+    /// Changes one entity in place (its id stays); false when there is none with this id.
+    pub fn edit(&mut self, id: EntityId, change: impl FnOnce(&mut Entity)) -> bool {
+        let Some(at) = self.entities.iter().position(|e| e.id == id) else { return false };
+        change(Arc::make_mut(&mut Arc::make_mut(&mut self.entities)[at]));
+        true
+    }
+
+    /// A box around all entities.
+    pub fn bounds(&self) -> Aabb {
+        self.entities.iter().fold(Aabb::EMPTY, |all, e| all.union(&e.bounds()))
+    }
+
+    /// The default tolerances for this model.
+    pub fn tolerances(&self) -> Tolerances {
+        Tolerances::of(&self.bounds())
+    }
+}

@@ -1,0 +1,147 @@
+//! How a heal is asked for, as data: the RON that `patchwright heal --patches` reads and that the picking tool
+//! writes, so that a session can be replayed; and what a heal reports.
+
+use serde::{Deserialize, Serialize};
+
+/// A whole heal: several patches with common settings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HealSpec {
+    /// What two picked curve ends may be apart and still be joined, in model units. Default: 1e-3 of the diagonal.
+    #[serde(default)]
+    pub joining_tol: Option<f64>,
+    /// The largest error wanted, in model units. Default: 1e-4 of the diagonal.
+    #[serde(default)]
+    pub tol: Option<f64>,
+    /// The largest number of spans along one side.
+    #[serde(default = "default_max_resolution")]
+    pub max_resolution: usize,
+    /// The surfaces to project on, by number; all when left out.
+    #[serde(default)]
+    pub onto: Option<Vec<usize>>,
+    /// Half the thickness of the box of influence (d of HJR99 (7)); from the corners when left out.
+    #[serde(default)]
+    pub slab: Option<f64>,
+    /// How many known projections an artificial one is made from (K of HJR99 (12)).
+    #[serde(default = "default_neighbours")]
+    pub neighbours: usize,
+    /// The patches.
+    pub patches: Vec<PatchSpec>,
+}
+
+fn default_max_resolution() -> usize {
+    128
+}
+
+fn default_neighbours() -> usize {
+    8
+}
+
+/// One patch: four sides, in any order and direction.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PatchSpec {
+    /// What it is called.
+    pub name: String,
+    /// What becomes of each side's curve.
+    #[serde(default)]
+    pub boundary: [BoundaryMode; 4],
+    /// The pieces of each side, in any order and direction.
+    pub sides: [Vec<Piece>; 4],
+}
+
+/// What becomes of a picked boundary curve.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum BoundaryMode {
+    /// It stays as picked.
+    #[default]
+    Keep,
+    /// It is projected like the interior.
+    Project,
+}
+
+/// One piece of a side.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Piece {
+    /// An iso-curve of a surface between two surface parameters: at `U(c)` it runs along v, at `V(c)` along u.
+    Iso {
+        /// The number of the surface.
+        surface: usize,
+        /// The parameter that stays fixed.
+        at: IsoAt,
+        /// Where it starts.
+        from: f64,
+        /// Where it ends.
+        to: f64,
+    },
+    /// An edge of a face, between two fractions of its arc length.
+    Edge {
+        /// The number of the face.
+        face: usize,
+        /// The loop: 0 is the outer one.
+        #[serde(rename = "loop")]
+        ring: usize,
+        /// The edge of the loop. An untrimmed surface has v = min, u = max, v = max, u = min.
+        edge: usize,
+        /// Where it starts, 0..=1.
+        from: f64,
+        /// Where it ends, 0..=1.
+        to: f64,
+    },
+    /// A straight segment.
+    Line((f64, f64, f64), (f64, f64, f64)),
+    /// A polyline.
+    Polyline(Vec<(f64, f64, f64)>),
+    /// A free curve of the file, between two fractions of its arc length.
+    Curve {
+        /// Its number among the file's curves.
+        id: usize,
+        /// Where it starts, 0..=1.
+        from: f64,
+        /// Where it ends, 0..=1.
+        to: f64,
+    },
+    /// A curve drawn across several surfaces: the polyline of the points, put onto the nearest surface.
+    Drawn(Vec<(f64, f64, f64)>),
+}
+
+/// The fixed parameter of an iso-curve.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub enum IsoAt {
+    /// u is fixed; the curve runs along v.
+    U(f64),
+    /// v is fixed; the curve runs along u.
+    V(f64),
+}
+
+/// What was measured of a healed patch (lengths in model units).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PatchReport {
+    /// The largest distance to the originals at the check points, gaps left out.
+    pub max_error: f64,
+    /// The root mean square of those distances.
+    pub rms: f64,
+    /// The numbers of spans M, N.
+    pub resolution: [usize; 2],
+    /// How many resolutions were tried.
+    pub iterations: usize,
+    /// Samples with a projection on the originals.
+    pub projected: usize,
+    /// Of these, samples that had several and took the nearest.
+    pub several: usize,
+    /// Samples in gaps, filled by Hardy's method.
+    pub artificial: usize,
+    /// Resolution and error of each iteration.
+    pub history: Vec<HealStep>,
+    /// Whether the wanted error was reached.
+    pub reached: bool,
+}
+
+/// One iteration of the refinement.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HealStep {
+    /// The numbers of spans M, N.
+    pub resolution: [usize; 2],
+    /// The largest error at them.
+    pub max_error: f64,
+}
