@@ -1,1 +1,3 @@
+//! The `patchwright` program.
+
 fn main() {}

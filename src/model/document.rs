@@ -70,7 +70,7 @@ pub enum Shape {
 }
 
 /// A healed patch as the document keeps it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Patch {
     /// The B-spline surface (bicubic, C1, double interior knots).
     pub surface: Arc<Surface>,

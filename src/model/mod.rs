@@ -1,4 +1,7 @@
 //! What a user has: documents, the commands that change them, and undo.
 
+pub mod command;
 pub mod document;
+pub mod history;
+pub mod selection;
 pub mod spec;

@@ -47,11 +47,28 @@ pub enum CurveError {
 }
 
 /// A B-spline curve. Control points are Cartesian; `weights` is `None` for polynomial curves.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(try_from = "RawCurve")]
 pub struct Curve {
     knots: Knots,
     points: Vec<DVec3>,
     weights: Option<Vec<f64>>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawCurve {
+    knots: Knots,
+    points: Vec<DVec3>,
+    weights: Option<Vec<f64>>,
+}
+
+impl TryFrom<RawCurve> for Curve {
+    type Error = CurveError;
+
+    fn try_from(raw: RawCurve) -> Result<Self, CurveError> {
+        Self::new(raw.knots, raw.points, raw.weights)
+    }
 }
 
 /// Weights that are all equal say nothing and are dropped; the others are checked.

@@ -69,10 +69,26 @@ pub enum KnotError {
 
 /// A knot vector with its degree p: `n + p + 1` non-decreasing finite values for n control points. Clamped
 /// ends are not required; the domain is `values[p]..=values[n]`.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(try_from = "RawKnots")]
 pub struct Knots {
     degree: usize,
     values: Vec<f64>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawKnots {
+    degree: usize,
+    values: Vec<f64>,
+}
+
+impl TryFrom<RawKnots> for Knots {
+    type Error = KnotError;
+
+    fn try_from(raw: RawKnots) -> Result<Self, KnotError> {
+        Self::new(raw.degree, raw.values)
+    }
 }
 
 /// Basis values at a parameter: `d[k][i]` is the k-th derivative of the basis function of control point

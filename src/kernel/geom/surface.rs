@@ -88,11 +88,29 @@ pub enum SurfaceError {
 
 /// A B-spline surface. Control points are Cartesian with u running fastest (`points[j * nu + i]`); `weights`
 /// is `None` for polynomial surfaces.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(try_from = "RawSurface")]
 pub struct Surface {
     knots: [Knots; 2],
     points: Vec<DVec3>,
     weights: Option<Vec<f64>>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawSurface {
+    knots: [Knots; 2],
+    points: Vec<DVec3>,
+    weights: Option<Vec<f64>>,
+}
+
+impl TryFrom<RawSurface> for Surface {
+    type Error = SurfaceError;
+
+    fn try_from(raw: RawSurface) -> Result<Self, SurfaceError> {
+        let [u, v] = raw.knots;
+        Self::new(u, v, raw.points, raw.weights)
+    }
 }
 
 /// A point of a surface with its partial derivatives.
