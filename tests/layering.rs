@@ -1,5 +1,7 @@
 //! The house rules: arrows between layers point one way, and only the top layers know a window.
 
+#![allow(clippy::unwrap_used, reason = "a test helper may stop the test")]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 

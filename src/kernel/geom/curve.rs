@@ -156,7 +156,7 @@ impl Curve {
         homogeneous(&self.points, self.weights())
     }
 
-    fn from_homogeneous(&self, knots: Knots, points: &[DVec4]) -> Self {
+    fn with_homogeneous(&self, knots: Knots, points: &[DVec4]) -> Self {
         let (points, weights) = cartesian(points, self.weights.is_some());
         Self { knots, points, weights }
     }
@@ -227,21 +227,21 @@ impl Curve {
     pub fn restricted(&self, start: f64, end: f64) -> Result<Self, CurveError> {
         let target = self.knots.restricted(start, end)?;
         let points = blossom::refine(&self.knots, &self.homogeneous(), &target);
-        Ok(self.from_homogeneous(target, &points))
+        Ok(self.with_homogeneous(target, &points))
     }
 
     /// The same curve with `t` inserted `times` more as a knot.
     pub fn knot_inserted(&self, t: f64, times: usize) -> Result<Self, CurveError> {
         let target = self.knots.inserted(t, times)?;
         let points = blossom::refine(&self.knots, &self.homogeneous(), &target);
-        Ok(self.from_homogeneous(target, &points))
+        Ok(self.with_homogeneous(target, &points))
     }
 
     /// The same curve at one degree more (with clamped ends).
     pub fn elevated(&self) -> Result<Self, CurveError> {
         let target = self.knots.elevated()?;
         let points = blossom::elevate(&self.knots, &self.homogeneous(), &target);
-        Ok(self.from_homogeneous(target, &points))
+        Ok(self.with_homogeneous(target, &points))
     }
 
     /// Points at the ends and at `per_span - 1` places inside each polynomial piece, with their parameters.
