@@ -2,5 +2,6 @@
 
 pub mod geom;
 pub mod job;
+pub mod mesh;
 pub mod num;
 pub mod tol;
