@@ -10,6 +10,8 @@
 //! documents into kernel calls and results into pictures. The feature `editor` (on by default) brings the
 //! window; without it the crate is the kernel, the file formats and the command line.
 
+pub mod cli;
+pub mod io;
 pub mod kernel;
 pub mod model;
 pub mod view;

@@ -1,3 +1,23 @@
-//! The `patchwright` program.
+//! Arguments -> editor or subcommand; exit codes; nothing else.
 
-fn main() {}
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+use patchwright::cli::{self, Arguments, Exit};
+
+fn main() -> ExitCode {
+    env_logger::init();
+    let arguments = Arguments::parse();
+    match &arguments.command {
+        Some(command) => cli::run(command, &arguments.common).into(),
+        None => edit(arguments.files).into(),
+    }
+}
+
+/// Opens the editor on the files, or on the bundled example when there are none.
+fn edit(_files: Vec<PathBuf>) -> Exit {
+    // With the feature `editor` this becomes `ui::run(files)`.
+    eprintln!("This build of patchwright has no window; see `patchwright --help` for its subcommands.");
+    Exit::Failed
+}

@@ -1,0 +1,88 @@
+//! The command line: one file per subcommand, each with its `Args` and its `run`.
+//!
+//! `run(&Args, &Common)` returns the exit code of a run that worked, or a [`CliError`]. Results go out through
+//! [`Common`].
+
+use std::path::PathBuf;
+
+use clap::{Parser, Subcommand};
+
+pub mod convert;
+mod error;
+mod exit;
+pub mod info;
+mod output;
+pub mod ranges;
+
+pub use error::CliError;
+pub use exit::Exit;
+pub use output::{Common, ProgressLine};
+
+/// Heals broken CAD surface models and shows where surfaces truly intersect.
+///
+/// Without a subcommand the editor opens, with the files given or the bundled example.
+#[derive(Debug, Parser)]
+#[command(name = "patchwright", version, args_conflicts_with_subcommands = true)]
+#[command(after_help = "Exit codes: 0 done, 1 failed, 2 bad arguments, 3 done but incomplete, 4 cancelled.")]
+pub struct Arguments {
+    /// Files to open in the editor
+    #[arg(value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// What to do instead
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// Options of every subcommand.
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// The subcommands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Tell what a file contains: entities, bounding box, units
+    Info(info::Args),
+    /// Convert a file into another format
+    Convert(convert::Args),
+}
+
+/// Runs a subcommand and says on standard error why it failed, if it did.
+pub fn run(command: &Command, common: &Common) -> Exit {
+    if let Some(threads) = common.threads {
+        // Only fails when the pool exists already, which is only so when somebody called this twice.
+        if let Err(error) = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global() {
+            common.warn(format!("--threads {threads} has no effect: {error}"));
+        }
+    }
+    let result = match command {
+        Command::Info(args) => info::run(args, common),
+        Command::Convert(args) => convert::run(args, common),
+    };
+    result.unwrap_or_else(|error| {
+        common.warn(format!("error: {}", error.message()));
+        error.exit()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn files_and_subcommands_are_told_apart() {
+        let parse = |line: &str| Arguments::try_parse_from(line.split(' '));
+        let files = parse("patchwright a.igs b.igs").unwrap();
+        assert!(files.command.is_none() && files.files.len() == 2);
+        let info = parse("patchwright info a.igs --json - --threads 2").unwrap();
+        assert!(matches!(info.command, Some(Command::Info(_))));
+        assert_eq!(info.common.threads, Some(2));
+        assert!(parse("patchwright info").is_err());
+        assert!(parse("patchwright info a.igs --threads 0").is_err());
+    }
+}

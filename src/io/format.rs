@@ -1,0 +1,67 @@
+//! The file formats, told apart by content first and by extension second.
+
+use std::path::Path;
+
+/// A file format.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Format {
+    /// IGES 5.3, fixed 80-column ASCII.
+    Iges,
+    /// This program's own project: RON.
+    Project,
+}
+
+/// The extension of a project, without the leading dot.
+pub const PROJECT_EXTENSION: &str = "patchwright.ron";
+
+impl Format {
+    /// The format that a file name asks for.
+    pub fn of_name(path: &Path) -> Option<Self> {
+        let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
+        match name.rsplit_once('.')?.1 {
+            "igs" | "iges" => Some(Self::Iges),
+            "ron" => Some(Self::Project),
+            _ => None,
+        }
+    }
+
+    /// The format that the bytes of a file look like.
+    pub fn of_content(bytes: &[u8]) -> Option<Self> {
+        let first = bytes.split(|&b| b == b'\n' || b == b'\r').find(|line| !line.trim_ascii().is_empty())?;
+        if first.len() >= 73 && matches!(first[72], b'S' | b'G' | b'D') {
+            return Some(Self::Iges);
+        }
+        let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes).trim_ascii_start();
+        (text.starts_with(b"(") || text.starts_with(b"//") || text.starts_with(b"Project(")).then_some(Self::Project)
+    }
+
+    /// All formats for an error message.
+    pub fn list() -> &'static str {
+        "IGES (.igs, .iges) or a project (.patchwright.ron)"
+    }
+
+    /// The name for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Iges => "IGES",
+            Self::Project => "Patchwright project",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_contents_tell_formats_apart() {
+        assert_eq!(Format::of_name(Path::new("a/B.IGS")), Some(Format::Iges));
+        assert_eq!(Format::of_name(Path::new("wing.patchwright.ron")), Some(Format::Project));
+        assert_eq!(Format::of_name(Path::new("igs")), None);
+        let line = format!("{:72}S      1\r\n", "start");
+        assert_eq!(Format::of_content(line.as_bytes()), Some(Format::Iges));
+        assert_eq!(Format::of_content(b"\n\n(version: 1)"), Some(Format::Project));
+        assert_eq!(Format::of_content(b"\x7fELF"), None);
+        assert_eq!(Format::of_content(b""), None);
+    }
+}

