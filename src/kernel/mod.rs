@@ -4,4 +4,5 @@ pub mod geom;
 pub mod job;
 pub mod mesh;
 pub mod num;
+pub mod ssi;
 pub mod tol;
