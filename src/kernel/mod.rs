@@ -3,6 +3,7 @@
 pub mod geom;
 pub mod job;
 pub mod mesh;
+pub mod mesh_ssi;
 pub mod num;
 pub mod ssi;
 pub mod tol;
