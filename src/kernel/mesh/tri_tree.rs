@@ -26,25 +26,25 @@ const PARALLEL: usize = 8192;
 /// Triangles and the tree over them.
 #[derive(Clone, Debug, Default)]
 pub struct TriTree {
-    points: Vec<DVec3>,
+    pub(super) points: Vec<DVec3>,
     /// In leaf order.
-    triangles: Vec<[u32; 3]>,
+    pub(super) triangles: Vec<[u32; 3]>,
     /// The caller's number of each triangle.
-    ids: Vec<u32>,
-    nodes: Vec<Node>,
+    pub(super) ids: Vec<u32>,
+    pub(super) nodes: Vec<Node>,
     bounds: Option<Aabb>,
-    origin: DVec3,
+    pub(super) origin: DVec3,
 }
 
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
-struct Node {
-    min: [f32; 3],
+pub(super) struct Node {
+    pub(super) min: [f32; 3],
     /// Leaf: its first triangle. Inner: how far behind this node its right child is.
-    link: u32,
-    max: [f32; 3],
+    pub(super) link: u32,
+    pub(super) max: [f32; 3],
     /// Leaf: how many triangles. Inner: 0.
-    count: u32,
+    pub(super) count: u32,
 }
 
 /// Where a line meets a triangle.
