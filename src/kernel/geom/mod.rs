@@ -8,11 +8,13 @@ mod aabb;
 mod bezier;
 pub mod blossom;
 mod curve;
+mod differential;
 mod knots;
 mod surface;
 
 pub use aabb::Aabb;
 pub use bezier::BezierPatch;
 pub use curve::{Curve, CurveError};
+pub use differential::{Curvature, FundamentalForms, unit_normal};
 pub use knots::{Basis, KnotError, Knots, MAX_DEGREE, MAX_DERIVATIVE};
 pub use surface::{Direction, Side, Surface, SurfaceError, SurfaceJet};
