@@ -7,6 +7,7 @@
 mod aabb;
 mod bezier;
 pub mod blossom;
+pub mod closest;
 mod curve;
 mod differential;
 mod knots;

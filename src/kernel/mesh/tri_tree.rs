@@ -289,6 +289,61 @@ impl TriTree {
     }
 }
 
+impl TriTree {
+    /// The caller's numbers of triangles within `reach` of `p`, with their distances, nearest first, ties by number.
+    pub fn within(&self, p: DVec3, reach: f64, found: &mut Vec<Nearest>) {
+        found.clear();
+        let local = p - self.origin;
+        let mut stack = vec![0_u32];
+        while let Some(at) = stack.pop() {
+            let Some(node) = self.nodes.get(at as usize) else { return };
+            if node.distance_squared(local) > reach * reach {
+                continue;
+            }
+            if node.count == 0 {
+                stack.extend([at + 1, at + node.link]);
+                continue;
+            }
+            for k in node.link as usize..(node.link + node.count) as usize {
+                let [a, b, c] = self.triangles[k].map(|p| self.points[p as usize]);
+                let barycentric = nearest_on_triangle(p, a, b, c);
+                let point = a * barycentric.x + b * barycentric.y + c * barycentric.z;
+                let distance = point.distance(p);
+                if distance <= reach {
+                    found.push(Nearest { triangle: self.ids[k], point, barycentric, distance });
+                }
+            }
+        }
+        found.sort_unstable_by(|x, y| x.distance.total_cmp(&y.distance).then(x.triangle.cmp(&y.triangle)));
+    }
+
+    /// The caller's numbers, increasing, of triangles whose boxes grown by `margin` meet the segment: all that
+    /// come within `margin` of it, and some more.
+    pub fn near_segment(&self, a: DVec3, b: DVec3, margin: f64, found: &mut Vec<u32>) {
+        found.clear();
+        let (a, d) = (a - self.origin, b - a);
+        let meets = |min: DVec3, max: DVec3| clip(&Aabb { min, max }.grown(margin), a, d, [0.0, 1.0]).is_some();
+        let mut stack = vec![0_u32];
+        while let Some(at) = stack.pop() {
+            let Some(node) = self.nodes.get(at as usize) else { return };
+            if !meets(Vec3::from_array(node.min).as_dvec3(), Vec3::from_array(node.max).as_dvec3()) {
+                continue;
+            }
+            if node.count == 0 {
+                stack.extend([at + 1, at + node.link]);
+                continue;
+            }
+            for k in node.link as usize..(node.link + node.count) as usize {
+                let own = Aabb::of(self.triangles[k].map(|p| self.points[p as usize] - self.origin));
+                if meets(own.min, own.max) {
+                    found.push(self.ids[k]);
+                }
+            }
+        }
+        found.sort_unstable();
+    }
+}
+
 impl Node {
     /// Where the ray enters the box, `None` when it misses it or enters behind `end`.
     fn enter(&self, o: Vec3, inverse: Vec3, end: f32) -> Option<f32> {
