@@ -3,5 +3,6 @@
 
 pub mod surface_set;
 pub mod tessellate;
+pub mod tri_mesh;
 pub mod tri_pairs;
 pub mod tri_tree;

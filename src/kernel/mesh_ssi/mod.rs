@@ -2,6 +2,7 @@
 //! signs, Point / PointUse / Segment topology, chains.
 
 pub mod perturbed;
+pub mod refine;
 pub mod topology;
 pub mod trace;
 
