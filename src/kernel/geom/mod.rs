@@ -5,6 +5,7 @@
 //! ([`blossom`]).
 
 mod aabb;
+pub mod arc_length;
 mod bezier;
 pub mod blossom;
 pub mod closest;
