@@ -9,7 +9,10 @@ use std::path::{Path, PathBuf};
 use crate::model::document::Document;
 
 mod format;
+pub mod obj;
+pub mod plot3d;
 mod report;
+pub mod stl;
 
 pub use format::{Format, PROJECT_EXTENSION};
 pub use report::{ImportReport, ReportLine, Severity};
