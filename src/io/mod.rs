@@ -12,6 +12,7 @@ mod format;
 pub mod obj;
 pub mod plot3d;
 mod report;
+pub mod step;
 pub mod stl;
 
 pub use format::{Format, PROJECT_EXTENSION};
