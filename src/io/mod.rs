@@ -8,13 +8,17 @@ use std::path::{Path, PathBuf};
 
 use crate::model::document::Document;
 
+mod atomic;
 mod format;
+pub mod iges;
 pub mod obj;
 pub mod plot3d;
 mod report;
 pub mod step;
 pub mod stl;
+mod tidy;
 
+pub use atomic::WriteError;
 pub use format::{Format, PROJECT_EXTENSION};
 pub use report::{ImportReport, ReportLine, Severity};
 
@@ -44,6 +48,14 @@ pub enum OpenError {
         /// The file.
         path: PathBuf,
     },
+    /// It is no IGES file that can be read.
+    #[error("{} cannot be read: {source}", path.display())]
+    Iges {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: iges::IgesError,
+    },
     /// Neither the content nor the extension is that of a format that can be read.
     #[error("{} is no file that can be read: expected {}", path.display(), Format::list())]
     Unknown {
@@ -55,6 +67,17 @@ pub enum OpenError {
 /// Why a file was not written. The file that was there before is untouched.
 #[derive(Debug, thiserror::Error)]
 pub enum SaveError {
+    /// The file system said no.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// The document does not fit into an IGES file.
+    #[error("cannot save {} as IGES: {source}", path.display())]
+    Iges {
+        /// The file.
+        path: PathBuf,
+        /// What does not fit.
+        source: iges::IgesWriteError,
+    },
     /// The extension names no format that can be written.
     #[error("cannot tell the format of {} by its extension: expected {}", path.display(), Format::list())]
     Unknown {
@@ -85,11 +108,24 @@ pub fn open(path: &Path) -> Result<Opened, OpenError> {
     if bytes.is_empty() {
         return Err(OpenError::Empty { path: path.into() });
     }
-    Err(OpenError::Unknown { path: path.into() })
+    match Format::of_content(&bytes).or_else(|| Format::of_name(path)) {
+        Some(Format::Iges) => iges::read(&bytes).map_err(|source| OpenError::Iges { path: path.into(), source }),
+        Some(Format::Project) | None => Err(OpenError::Unknown { path: path.into() }),
+    }
 }
 
 /// Writes a document, in one step: on an error the file that was there before is untouched.
 pub fn save(path: &Path, document: &Document, options: &SaveOptions) -> Result<Saved, SaveError> {
-    let _ = (document, options);
-    Err(SaveError::Unknown { path: path.into() })
+    let unknown = || SaveError::Unknown { path: path.into() };
+    match options.format.or_else(|| Format::of_name(path)).ok_or_else(unknown)? {
+        Format::Iges => {
+            let file_name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+            let options = iges::IgesOptions { file_name, time: std::time::SystemTime::now() };
+            let (text, saved) =
+                iges::write(document, &options).map_err(|source| SaveError::Iges { path: path.into(), source })?;
+            atomic::write(path, text.as_bytes())?;
+            Ok(saved)
+        }
+        Format::Project => Err(unknown()),
+    }
 }

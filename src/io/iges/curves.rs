@@ -1,0 +1,216 @@
+//! Lines (110), circular arcs (100) and composites (102).
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use glam::DVec3;
+
+use super::params::Params;
+use crate::kernel::geom::{Curve, Knots};
+
+/// What ends of members may be apart and still be joined, as a fraction of the composite's size; the resolution
+/// that the file claims counts as well, up to [`LOOSEST`].
+const JOIN: f64 = 1e-9;
+const LOOSEST: f64 = 1e-4;
+
+/// The segment of a line record.
+pub(super) fn line(params: &mut Params<'_>) -> Result<Curve, String> {
+    let mut point = || -> Result<DVec3, String> {
+        let mut p = DVec3::ZERO;
+        for axis in 0..3 {
+            p[axis] = params.real_or(0.0, "a coordinate").map_err(|e| e.to_string())?;
+        }
+        Ok(p)
+    };
+    let (a, b) = (point()?, point()?);
+    if a == b {
+        return Err("it has no length".into());
+    }
+    Curve::segment(a, b).map_err(|e| e.to_string())
+}
+
+/// The arc of a record: counter-clockwise from start to end around the centre in a plane of constant z, a full
+/// circle where they are one. Exact: rational quadratics of at most 90 degrees, parametrized over the angle at
+/// their joints.
+pub(super) fn arc(params: &mut Params<'_>) -> Result<Curve, String> {
+    let mut value = || params.real_or(0.0, "a coordinate").map_err(|e| e.to_string());
+    let z = value()?;
+    let mut point = || -> Result<DVec3, String> { Ok(DVec3::new(value()?, value()?, z)) };
+    let (center, start, end) = (point()?, point()?, point()?);
+    circular_arc(center, start, end)
+}
+
+fn circular_arc(center: DVec3, start: DVec3, end: DVec3) -> Result<Curve, String> {
+    let (a, b) = (start - center, end - center);
+    let radius = a.length();
+    if !(radius > 0.0 && radius.is_finite() && b.is_finite()) {
+        return Err("its radius is zero or not finite".into());
+    }
+    let from = a.y.atan2(a.x);
+    let mut sweep = if start == end { TAU } else { (b.y.atan2(b.x) - from).rem_euclid(TAU) };
+    if sweep == 0.0 {
+        sweep = TAU;
+    }
+    let pieces = ((sweep / FRAC_PI_2 - 1e-9).ceil()).clamp(1.0, 4.0) as usize;
+    let step = sweep / pieces as f64;
+    let (mut points, mut weights, mut breaks) = (vec![start], vec![1.0], vec![from]);
+    for i in 1..=pieces {
+        let (last, next) = (points[points.len() - 1], from + step * i as f64);
+        let corner = next - 0.5 * step;
+        let on = |angle: f64, r: f64| center + DVec3::new(angle.cos(), angle.sin(), 0.0) * r;
+        points.push(on(corner, radius / (0.5 * step).cos()));
+        points.push(if i == pieces { end } else { on(next, radius) });
+        weights.extend([(0.5 * step).cos(), 1.0]);
+        breaks.push(next);
+        if last == points[points.len() - 1] && pieces > 1 {
+            return Err("its radius is lost in the rounding of its coordinates".into());
+        }
+    }
+    let knots = Knots::clamped(2, &breaks, 2).map_err(|e| e.to_string())?;
+    Curve::new(knots, points, Some(weights)).map_err(|e| e.to_string())
+}
+
+/// The members joined into as few curves as can be, in order; members that run against the others are turned
+/// round. Degrees are raised to the largest, weights scaled to agree at the joints, inner joints are C0.
+pub(super) fn join(members: Vec<Curve>, resolution: f64, notes: &mut Vec<String>) -> Vec<Curve> {
+    let size = members.iter().map(|c| c.bounds().diagonal()).fold(0.0, f64::max);
+    let close = (JOIN * size).max(resolution.min(LOOSEST * size));
+    let mut chains: Vec<Vec<Curve>> = Vec::new();
+    let mut gap = 0.0f64;
+    for member in members {
+        let [start, end] = member.ends();
+        if let Some(chain) = chains.last_mut() {
+            let first_only = chain.len() == 1;
+            if let Some(last) = chain.last_mut() {
+                let [head, tail] = last.ends();
+                if tail.distance(start) <= close {
+                    gap = gap.max(tail.distance(start));
+                    chain.push(member);
+                    continue;
+                }
+                if tail.distance(end) <= close {
+                    gap = gap.max(tail.distance(end));
+                    chain.push(member.reversed());
+                    continue;
+                }
+                if first_only && head.distance(start).min(head.distance(end)) <= close {
+                    *last = last.reversed();
+                    let forward = head.distance(start) <= close;
+                    gap = gap.max(head.distance(if forward { start } else { end }));
+                    chain.push(if forward { member } else { member.reversed() });
+                    continue;
+                }
+            }
+        }
+        chains.push(vec![member]);
+    }
+    if chains.len() > 1 {
+        notes.push(format!("its members form {} chains that do not meet", chains.len()));
+    }
+    if gap > JOIN * size {
+        notes.push(format!("its members miss each other by up to {gap:.3e}; the ends were moved together"));
+    }
+    let mut joined = Vec::new();
+    for chain in chains {
+        match concatenated(&chain) {
+            Ok(curve) => joined.push(curve),
+            Err(reason) => {
+                notes.push(format!("its members were kept apart: {reason}"));
+                joined.extend(chain);
+            }
+        }
+    }
+    joined
+}
+
+/// The curve that runs through all curves of a chain one after the other.
+fn concatenated(chain: &[Curve]) -> Result<Curve, String> {
+    let [single] = chain else {
+        let degree = chain.iter().map(|c| c.knots().degree()).max().unwrap_or(1);
+        let rational = chain.iter().any(|c| c.weights().is_some());
+        let (mut knots, mut points, mut weights) = (Vec::new(), Vec::<DVec3>::new(), Vec::<f64>::new());
+        for curve in chain {
+            let [start, end] = curve.domain();
+            let mut curve = curve.restricted(start, end).map_err(|e| e.to_string())?;
+            while curve.knots().degree() < degree {
+                curve = curve.elevated().map_err(|e| e.to_string())?;
+            }
+            let own = curve.weights().map_or_else(|| vec![1.0; curve.points().len()], <[f64]>::to_vec);
+            let values = curve.knots().values();
+            match (knots.last().copied(), weights.last().copied()) {
+                (Some(last), Some(weight)) => {
+                    let (shift, factor): (f64, f64) = (last - start, weight / own[0]);
+                    knots.pop();
+                    knots.extend(values[degree + 1..].iter().map(|v| v + shift));
+                    points.extend_from_slice(&curve.points()[1..]);
+                    weights.extend(own[1..].iter().map(|w| w * factor));
+                }
+                _ => {
+                    knots.extend_from_slice(values);
+                    points.extend_from_slice(curve.points());
+                    weights.extend(own);
+                }
+            }
+        }
+        let knots = Knots::new(degree, knots).map_err(|e| e.to_string())?;
+        return Curve::new(knots, points, rational.then_some(weights)).map_err(|e| e.to_string());
+    };
+    Ok(single.clone())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn v(x: f64, y: f64) -> DVec3 {
+        DVec3::new(x, y, 2.0)
+    }
+
+    #[test]
+    fn arcs_are_round_and_run_counter_clockwise() {
+        let r = 2.5;
+        let at =
+            |degrees: f64| v(1.0, -1.0) + r * DVec3::new(degrees.to_radians().cos(), degrees.to_radians().sin(), 0.0);
+        for (from, sweep) in [(0.0, 90.0), (10.0, 350.0), (-170.0, 30.0), (30.0, 180.0), (77.0, 360.0), (5.0, 1e-3)] {
+            let end = if sweep == 360.0 { at(from) } else { at(from + sweep) };
+            let arc = circular_arc(v(1.0, -1.0), at(from), end).unwrap();
+            let [a, b] = arc.domain();
+            assert!((b - a - f64::to_radians(sweep)).abs() < 1e-12);
+            for i in 0..=40 {
+                let p = arc.eval(a + (b - a) * f64::from(i) / 40.0);
+                assert!((p.distance(v(1.0, -1.0)) - r).abs() < 1e-14);
+            }
+            let middle = arc.eval(0.5 * (a + b));
+            assert!(middle.distance(at(from + 0.5 * sweep)) < 1e-9, "{from} {sweep}");
+        }
+        assert!(circular_arc(v(0.0, 0.0), v(0.0, 0.0), v(1.0, 0.0)).is_err());
+    }
+
+    #[test]
+    fn composites_of_lines_and_arcs_become_one_curve() {
+        let line = |a, b| Curve::segment(a, b).unwrap();
+        let arc = circular_arc(v(1.0, 1.0), v(1.0, 0.0), v(2.0, 1.0)).unwrap();
+        // The last member is against the run of the others, as files have it.
+        let members = vec![line(v(0.0, 0.0), v(1.0, 0.0)), arc, line(v(2.0, 3.0), v(2.0, 1.0))];
+        let mut notes = Vec::new();
+        let joined = join(members, 0.0, &mut notes);
+        assert_eq!((joined.len(), notes.len()), (1, 0), "{notes:?}");
+        let curve = &joined[0];
+        assert_eq!(curve.knots().degree(), 2);
+        assert_eq!(curve.ends(), [v(0.0, 0.0), v(2.0, 3.0)]);
+        let [a, b] = curve.domain();
+        for i in 0..=200 {
+            let p = curve.eval(a + (b - a) * f64::from(i) / 200.0);
+            let on_line = (p.y.abs() < 1e-12 && p.x <= 1.0) || ((p.x - 2.0).abs() < 1e-12 && p.y >= 1.0);
+            assert!(on_line || (p.distance(v(1.0, 1.0)) - 1.0).abs() < 1e-12, "{p}");
+        }
+    }
+
+    #[test]
+    fn members_that_do_not_meet_stay_apart_and_are_named() {
+        let line = |a, b| Curve::segment(a, b).unwrap();
+        let mut notes = Vec::new();
+        let members = vec![line(v(0.0, 0.0), v(1.0, 0.0)), line(v(1.1, 0.0), v(2.0, 0.0))];
+        assert_eq!(join(members, 0.01, &mut notes).len(), 2);
+        assert_eq!(notes.len(), 1);
+    }
+}

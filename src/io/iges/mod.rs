@@ -1,0 +1,453 @@
+//! IGES 5.3, fixed 80-column ASCII: surfaces 128 and 114, curves 126, 112, 110, 100 and 102 with transforms 124,
+//! units, colours 314 and names 406. Trimmed faces (144, 143, 510) open as their whole surfaces.
+//!
+//! Nothing in a file is trusted: counts are checked against the bytes that are there, pointers may lead nowhere
+//! or in circles, and whatever is wrong with one entity loses that entity only. Every entity either becomes
+//! geometry, describes some (transform, colour, name), or has a line in the report. Cost: linear in the file.
+
+mod curves;
+mod directory;
+mod header;
+mod kinds;
+mod params;
+mod power_basis;
+mod sections;
+mod spline;
+mod transform;
+mod uses;
+mod write;
+
+pub use write::{IgesOptions, IgesWriteError, write};
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3};
+
+use self::directory::Directory;
+use self::header::Header;
+use self::params::Params;
+use self::sections::{Line, Sections};
+use self::uses::Uses;
+use super::{ImportReport, Opened, Severity};
+use crate::kernel::geom::{Curve, Surface};
+use crate::model::document::{Document, EntityId, Shape};
+
+/// Why a file is no IGES file that can be read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum IgesError {
+    /// No line has a section letter where IGES has it.
+    #[error("none of its {lines} lines has a section letter (S, G, D, P) in column 73, as every line of IGES must")]
+    NotIges {
+        /// The number of lines.
+        lines: usize,
+    },
+    /// There is no entity at all.
+    #[error("it has no directory section, hence no entities; it was probably cut off while it was written")]
+    NoEntities,
+    /// The binary form of IGES.
+    #[error("it is IGES in binary form, which is not read; export it in fixed ASCII form")]
+    Binary,
+    /// The compressed form of IGES.
+    #[error("it is IGES in compressed form, which is not read; export it in fixed ASCII form")]
+    Compressed,
+}
+
+/// How many members of composites are followed for each entity of the file: composites of composites could
+/// otherwise unfold without end.
+const MEMBERS_PER_ENTITY: usize = 4;
+
+/// Reads the bytes of a file.
+pub fn read(bytes: &[u8]) -> Result<Opened, IgesError> {
+    let sections = Sections::of(bytes)?;
+    let mut report = ImportReport::default();
+    if sections.directory.is_empty() {
+        let found = sections.global.len() + sections.parameter.len();
+        return Err(if found == 0 { IgesError::NotIges { lines: sections.strays } } else { IgesError::NoEntities });
+    }
+    let header = Header::of(&sections.global, &mut report);
+    if sections.strays > 0 {
+        let reason = format!("{} lines have no section letter in column 73 and were left out", sections.strays);
+        report.add(Severity::Warning, "file", None, Some(sections.first_stray), reason);
+    }
+    if !sections.terminated {
+        report.add(Severity::Warning, "file", None, None, "there is no terminate section; the file may be cut off");
+    }
+    let directory = Directory::of(&sections.directory, &mut report);
+    for entry in &directory.entries {
+        *report.found.entry(format!("IGES {}", entry.kind)).or_default() += 1;
+    }
+    let document = Document::new(header.unit);
+    let members_left = MEMBERS_PER_ENTITY * directory.entries.len() + 1000;
+    let reader = Reader {
+        sections,
+        header,
+        directory,
+        transforms: HashMap::new(),
+        colors: HashMap::new(),
+        first_line: None,
+        report,
+        document,
+        members_left,
+    };
+    Ok(reader.run())
+}
+
+/// A file while it is read.
+struct Reader<'a> {
+    sections: Sections<'a>,
+    header: Header,
+    directory: Directory,
+    transforms: HashMap<usize, transform::Known>,
+    colors: HashMap<usize, Option<[f32; 3]>>,
+    /// The place of the first parameter line of each entity by the pointers on the lines themselves; made when
+    /// the directory was found to point elsewhere.
+    first_line: Option<HashMap<usize, usize>>,
+    report: ImportReport,
+    document: Document,
+    members_left: usize,
+}
+
+/// What a record describes.
+enum Geometry {
+    Surfaces(Vec<Surface>),
+    Curves(Vec<Curve>),
+}
+
+impl Reader<'_> {
+    fn run(mut self) -> Opened {
+        let uses = Uses::of(&mut self);
+        for at in 0..self.directory.entries.len() {
+            match self.directory.entries[at].kind {
+                128 | 114 => self.surface(at, &uses),
+                126 | 112 | 110 | 100 | 102 => self.free_curve(at, &uses),
+                144 | 143 | 510 => self.face(at, &uses),
+                124 | 314 | 0 => {}
+                406 if self.directory.entries[at].form == 15 => {}
+                kind => {
+                    let (severity, reason) = kinds::unread(kind, uses.is_consumed(at));
+                    self.note(severity, at, reason);
+                }
+            }
+        }
+        self.show_all_if_all_are_hidden();
+        self.report.surfaces = self.document.surfaces().count();
+        self.report.curves = self.document.curves().count();
+        Opened { document: self.document, report: self.report }
+    }
+
+    /// A report line on an entity.
+    fn note(&mut self, severity: Severity, at: usize, reason: impl Into<String>) {
+        let entry = &self.directory.entries[at];
+        self.report.add(severity, format!("IGES {}", entry.kind), Some(entry.sequence), Some(entry.line), reason);
+    }
+
+    fn warn_all(&mut self, at: usize, notes: Vec<String>) {
+        for note in notes {
+            self.note(Severity::Warning, at, note);
+        }
+    }
+
+    /// Runs `read` on the parameters of an entity, behind its type number.
+    fn record<T>(&mut self, at: usize, read: impl FnOnce(&mut Self, &mut Params<'_>) -> T) -> Result<T, String> {
+        let bytes = self.parameter_data(at)?;
+        let mut params = Params::new(&bytes, self.header.delimiters);
+        let kind = params.integer("the entity type").map_err(|e| e.to_string())?;
+        let expected = self.directory.entries[at].kind;
+        if kind != expected {
+            return Err(format!("its parameters are those of type {kind}"));
+        }
+        Ok(read(self, &mut params))
+    }
+
+    /// The parameter data of an entity, without line ends. Data may reach into column 65.
+    fn parameter_data(&mut self, at: usize) -> Result<Vec<u8>, String> {
+        let entry = &self.directory.entries[at];
+        let (sequence, pointer, count) = (entry.sequence, entry.parameters, entry.parameter_lines.max(1));
+        let lines = &self.sections.parameter;
+        let owner = |line: &Line<'_>| {
+            let field = if line.columns(64, 65) == b" " { line.columns(65, 72) } else { line.columns(66, 72) };
+            std::str::from_utf8(field.trim_ascii()).ok()?.parse::<usize>().ok()
+        };
+        let belongs = |line: &Line<'_>| owner(line).is_none_or(|o| o == sequence);
+        let mut first = pointer.checked_sub(1).filter(|&first| lines.get(first).is_some_and(belongs));
+        if first.is_none() {
+            let index = self.first_line.get_or_insert_with(|| {
+                let mut index = HashMap::new();
+                for (place, line) in lines.iter().enumerate() {
+                    if let Some(owner) = owner(line) {
+                        index.entry(owner).or_insert(place);
+                    }
+                }
+                index
+            });
+            first = index.get(&sequence).copied();
+        }
+        let Some(first) = first else {
+            return Err(format!("its parameter data (line P {pointer}) is missing"));
+        };
+        let mut bytes = Vec::with_capacity(64 * count.min(lines.len() - first));
+        for line in lines[first..].iter().take(count).take_while(|line| belongs(line)) {
+            let width = if line.columns(64, 65) == b" " { 64 } else { 65 };
+            bytes.extend_from_slice(line.columns(0, width));
+        }
+        Ok(bytes)
+    }
+
+    /// What a record describes, in the coordinates of the record, with its properties.
+    fn geometry(&mut self, at: usize, depth: usize) -> Result<(Geometry, Vec<usize>), String> {
+        let kind = self.directory.entries[at].kind;
+        let resolution = self.header.resolution;
+        let mut notes = Vec::new();
+        let read = self.record(at, |reader, params| {
+            let notes = &mut notes;
+            let one = |curve| Geometry::Curves(vec![curve]);
+            let geometry = match kind {
+                128 => Geometry::Surfaces(spline::surface(params, notes)?),
+                114 => Geometry::Surfaces(power_basis::surface(params, resolution, notes)?),
+                126 => Geometry::Curves(spline::curve(params, notes)?),
+                112 => Geometry::Curves(power_basis::curve(params, resolution, notes)?),
+                110 => one(curves::line(params)?),
+                100 => one(curves::arc(params)?),
+                102 => Geometry::Curves(reader.composite(params, depth, notes)?),
+                other => return Err(format!("entity {other} has no curve or surface that can be read")),
+            };
+            Ok((geometry, params.properties()))
+        });
+        self.warn_all(at, notes);
+        read?
+    }
+
+    /// The curves of a composite: its members, each moved by its own transform, joined.
+    fn composite(
+        &mut self,
+        params: &mut Params<'_>,
+        depth: usize,
+        notes: &mut Vec<String>,
+    ) -> Result<Vec<Curve>, String> {
+        if depth > 16 {
+            return Err("composites are nested more than 16 deep, or lead back to themselves".into());
+        }
+        let count = params.count("members", 1).map_err(|e| e.to_string())?;
+        let pointers: Vec<usize> =
+            (0..count).map(|_| params.pointer()).collect::<Result<_, _>>().map_err(|e| e.to_string())?;
+        let mut members = Vec::new();
+        for pointer in pointers {
+            if self.members_left == 0 {
+                return Err("composites of composites unfold into too many members".into());
+            }
+            self.members_left -= 1;
+            let Some(at) = self.directory.find(pointer) else {
+                notes.push(format!("member {pointer} does not exist"));
+                continue;
+            };
+            if matches!(self.directory.entries[at].kind, 116 | 132) {
+                continue; // a point between two members says nothing that the members do not
+            }
+            match self.geometry(at, depth + 1).and_then(|(geometry, _)| {
+                let map = self.transform(self.directory.entries[at].transform)?;
+                Ok((geometry, map))
+            }) {
+                Ok((Geometry::Curves(curves), map)) => {
+                    members.extend(curves.into_iter().map(|c| map.map_or(c.clone(), |map| c.transformed(&map))));
+                }
+                Ok((Geometry::Surfaces(_), _)) => notes.push(format!("member {pointer} is no curve")),
+                Err(reason) => notes.push(format!("member {pointer} was left out: {reason}")),
+            }
+        }
+        if members.is_empty() {
+            return Err("it has no member that can be read".into());
+        }
+        Ok(curves::join(members, self.header.resolution, notes))
+    }
+
+    /// The map from the coordinates of an entity's record to the model's, `None` where it does nothing. A
+    /// transform that cannot be followed is reported and left out.
+    fn placement(&mut self, at: usize, outer: Option<usize>) -> Option<DAffine3> {
+        let scale = 1.0 / self.header.scale;
+        let mut map = (scale != 1.0).then(|| DAffine3::from_scale(DVec3::splat(scale)));
+        for owner in outer.into_iter().chain([at]) {
+            match self.transform(self.directory.entries[owner].transform) {
+                Ok(None) => {}
+                Ok(Some(inner)) => map = Some(map.map_or(inner, |map| map * inner)),
+                Err(reason) => self.note(Severity::Warning, owner, format!("not moved to its place: {reason}")),
+            }
+        }
+        map.filter(|map| *map != DAffine3::IDENTITY)
+    }
+
+    /// A surface: once for itself or for all faces that share its place, once more for each other place.
+    fn surface(&mut self, at: usize, uses: &Uses) {
+        let (geometry, properties) = match self.geometry(at, 0) {
+            Ok((Geometry::Surfaces(surfaces), properties)) => (surfaces, properties),
+            Ok(_) => return,
+            Err(reason) => return self.note(Severity::Skipped, at, reason),
+        };
+        let mut places: Vec<(usize, Option<usize>)> = Vec::new();
+        for &face in uses.faces_of(at) {
+            let transform = self.directory.entries[face].transform;
+            if !places.iter().any(|&(known, _)| known == transform) {
+                places.push((transform, Some(face)));
+            }
+        }
+        if places.is_empty() {
+            places.push((0, None));
+        }
+        for (_, face) in places {
+            let map = self.placement(at, face);
+            let name = face.and_then(|face| self.name_of(face, uses.properties_of(face)));
+            let name = name.or_else(|| self.name_of(at, &properties));
+            let count = geometry.len();
+            for (part, surface) in geometry.iter().enumerate() {
+                let moved = map.map_or_else(|| surface.clone(), |map| surface.transformed(&map));
+                if let Err(reason) = sound(moved.points()) {
+                    self.note(Severity::Skipped, at, reason);
+                    continue;
+                }
+                let number = self.document.surfaces().count();
+                self.add(
+                    Shape::Surface(Arc::new(moved)),
+                    face.unwrap_or(at),
+                    at,
+                    name.as_deref(),
+                    (part, count),
+                    || format!("Surface {number}"),
+                );
+            }
+        }
+    }
+
+    /// A curve, when it is one of the model and not a means to describe something else.
+    fn free_curve(&mut self, at: usize, uses: &Uses) {
+        let entry = &self.directory.entries[at];
+        if entry.usage == 5 || uses.is_consumed(at) {
+            return self.note(Severity::Info, at, "only describes another entity; no free curve");
+        }
+        if entry.dependent {
+            return self.note(Severity::Skipped, at, "belongs to another entity, which is not read");
+        }
+        let (curves, properties) = match self.geometry(at, 0) {
+            Ok((Geometry::Curves(curves), properties)) => (curves, properties),
+            Ok(_) => return,
+            Err(reason) => return self.note(Severity::Skipped, at, reason),
+        };
+        let map = self.placement(at, None);
+        let name = self.name_of(at, &properties);
+        let count = curves.len();
+        for (part, curve) in curves.into_iter().enumerate() {
+            let moved = map.map_or_else(|| curve.clone(), |map| curve.transformed(&map));
+            if let Err(reason) = sound(moved.points()) {
+                self.note(Severity::Skipped, at, reason);
+                continue;
+            }
+            let number = self.document.curves().count();
+            self.add(Shape::Curve(Arc::new(moved)), at, at, name.as_deref(), (part, count), || {
+                format!("Curve {number}")
+            });
+        }
+    }
+
+    /// A face: its surface is opened where its own entry stands; here only the trimming is reported.
+    fn face(&mut self, at: usize, uses: &Uses) {
+        match uses.surface_of(at).map(|surface| (surface, self.directory.entries[surface].kind)) {
+            Some((_, 128 | 114)) => {
+                self.note(Severity::Info, at, "trimmed face, opened as its whole surface without the trimming");
+            }
+            Some((_, kind)) => {
+                let reason = format!("its surface is of type {kind} ({}), which is not read", kinds::name(kind));
+                self.note(Severity::Skipped, at, reason);
+            }
+            None => self.note(Severity::Skipped, at, "the surface that it trims does not exist"),
+        }
+    }
+
+    fn add(
+        &mut self,
+        shape: Shape,
+        owner: usize,
+        at: usize,
+        name: Option<&str>,
+        (part, parts): (usize, usize),
+        default_name: impl Fn() -> String,
+    ) -> EntityId {
+        let mut name = name.map_or_else(default_name, str::to_owned);
+        if parts > 1 {
+            name = format!("{name} part {}", part + 1);
+        }
+        let color = self.color_of(owner).or_else(|| self.color_of(at));
+        let visible = !self.directory.entries[owner].blanked;
+        let id = self.document.add(name, shape, color);
+        if !visible {
+            self.document.edit(id, |entity| entity.visible = false);
+        }
+        id
+    }
+
+    /// The name that a property gives, or else the label of the directory entry.
+    fn name_of(&mut self, at: usize, properties: &[usize]) -> Option<String> {
+        for &pointer in properties.iter().take(64) {
+            let Some(property) = self.directory.find(pointer) else { continue };
+            let entry = &self.directory.entries[property];
+            if entry.kind == 406 && entry.form == 15 {
+                let name = self.record(property, |_, params| {
+                    params.next(); // the number of values, always 1
+                    params.text()
+                });
+                if let Some(name) = name.ok().filter(|name| !name.is_empty()) {
+                    return Some(name);
+                }
+            }
+        }
+        let label = &self.directory.entries[at].label;
+        (!label.is_empty()).then(|| label.clone())
+    }
+
+    /// The colour of an entity, linear RGB.
+    fn color_of(&mut self, at: usize) -> Option<[f32; 3]> {
+        let color = self.directory.entries[at].color;
+        if color >= 0 {
+            return kinds::standard_color(color);
+        }
+        let pointer = usize::try_from(color.unsigned_abs()).ok()?;
+        if let Some(known) = self.colors.get(&pointer) {
+            return *known;
+        }
+        let definition = self.directory.find(pointer).filter(|&at| self.directory.entries[at].kind == 314);
+        let read = definition.and_then(|at| {
+            let percent = self.record(at, |_, params| -> Result<[f64; 3], params::ParamError> {
+                Ok([params.real("red")?, params.real("green")?, params.real("blue")?])
+            });
+            percent.ok()?.ok().filter(|p| p.iter().all(|v| v.is_finite()))
+        });
+        let color = read.map(|percent| percent.map(kinds::linear_of_percent));
+        if color.is_none() {
+            self.note(Severity::Warning, at, format!("its colour (entity {pointer}) cannot be read"));
+        }
+        self.colors.insert(pointer, color);
+        color
+    }
+
+    /// A file in which everything is marked hidden would open as nothing.
+    fn show_all_if_all_are_hidden(&mut self) {
+        let hidden: Vec<EntityId> = self.document.entities().iter().filter(|e| !e.visible).map(|e| e.id).collect();
+        let all = self.document.entities().len();
+        if hidden.is_empty() || hidden.len() < all {
+            return;
+        }
+        for id in hidden {
+            self.document.edit(id, |entity| entity.visible = true);
+        }
+        self.report.add(Severity::Warning, "file", None, None, format!("all {all} entities are hidden; all are shown"));
+    }
+}
+
+/// Whether moved control points are finite and more than one point.
+fn sound(points: &[DVec3]) -> Result<(), String> {
+    if points.iter().any(|p| !p.is_finite()) {
+        return Err("its transform moves it to infinity".into());
+    }
+    match points.first() {
+        Some(first) if points.iter().any(|p| p != first) => Ok(()),
+        _ => Err("it is a single point".into()),
+    }
+}
