@@ -2,5 +2,10 @@
 //! is plain data and is tested without a display.
 
 pub mod camera;
+pub mod display;
 pub mod navigation;
+pub mod pick;
+pub mod scene;
+pub mod section;
+pub mod segment_tree;
 pub mod viewport;

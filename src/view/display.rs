@@ -1,0 +1,358 @@
+//! One entity as triangles and lines: what is drawn of it and what can be picked.
+//!
+//! A surface is one tensor grid over all its patches, so no crack can open between them, and its border and
+//! iso-lines are grid lines, so they lie in the triangles and cover them exactly. A free curve is a polyline that
+//! keeps the same chord tolerance, by the second derivative between samples.
+
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+
+use super::segment_tree::{Segment, SegmentTree};
+use crate::kernel::geom::{Aabb, Curve, Direction, Knots, Side, Surface};
+use crate::kernel::mesh::tessellate::{SurfaceMesh, TessellateOptions, grid_lines, tessellate_on};
+use crate::kernel::mesh::tri_tree::TriTree;
+use crate::model::document::EntityId;
+
+/// The most segments of one free curve.
+const MAX_SEGMENTS: usize = 8192;
+/// The most parts along one direction of a surface.
+const MAX_PARTS: usize = 512;
+/// The most iso-lines along one direction.
+const MAX_ISO: usize = 15;
+
+/// Names a curve that is drawn and can be picked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CurveRef {
+    /// A free curve of the document.
+    Free(EntityId),
+    /// A border of a surface.
+    Border(EntityId, Side),
+    /// An iso-curve of a surface: the direction that is fixed and its value.
+    Iso(EntityId, Direction, f64),
+}
+
+impl CurveRef {
+    /// The entity it belongs to.
+    pub fn entity(&self) -> EntityId {
+        match *self {
+            Self::Free(id) | Self::Border(id, _) | Self::Iso(id, ..) => id,
+        }
+    }
+}
+
+/// What has a shape.
+#[derive(Clone, Debug)]
+pub enum Geometry {
+    /// A surface or healed patch.
+    Surface(Arc<Surface>),
+    /// A free curve.
+    Curve(Arc<Curve>),
+}
+
+impl Geometry {
+    /// A box around it.
+    pub fn bounds(&self) -> Aabb {
+        match self {
+            Self::Surface(surface) => surface.bounds(),
+            Self::Curve(curve) => curve.bounds(),
+        }
+    }
+
+    /// Whether it is the same thing in memory.
+    pub fn same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Surface(a), Self::Surface(b)) => Arc::ptr_eq(a, b),
+            (Self::Curve(a), Self::Curve(b)) => Arc::ptr_eq(a, b),
+            _ => false,
+        }
+    }
+
+    /// The domain of one of its curves.
+    pub fn curve_domain(&self, curve: &CurveRef) -> Option<[f64; 2]> {
+        match (self, curve) {
+            (Self::Curve(c), CurveRef::Free(_)) => Some(c.domain()),
+            (Self::Surface(s), CurveRef::Border(_, Side::VMin | Side::VMax) | CurveRef::Iso(_, Direction::V, _)) => {
+                Some(s.domain()[0])
+            }
+            (Self::Surface(s), CurveRef::Border(..) | CurveRef::Iso(..)) => Some(s.domain()[1]),
+            _ => None,
+        }
+    }
+
+    /// The surface parameters of a point of one of its curves.
+    pub fn curve_uv(&self, curve: &CurveRef, t: f64) -> Option<DVec2> {
+        let Self::Surface(surface) = self else { return None };
+        let [u, v] = surface.domain();
+        match *curve {
+            CurveRef::Border(_, Side::VMin) => Some(DVec2::new(t, v[0])),
+            CurveRef::Border(_, Side::UMax) => Some(DVec2::new(u[1], t)),
+            CurveRef::Border(_, Side::VMax) => Some(DVec2::new(t, v[1])),
+            CurveRef::Border(_, Side::UMin) => Some(DVec2::new(u[0], t)),
+            CurveRef::Iso(_, Direction::U, c) => Some(DVec2::new(c, t)),
+            CurveRef::Iso(_, Direction::V, c) => Some(DVec2::new(t, c)),
+            CurveRef::Free(_) => None,
+        }
+    }
+
+    /// The point of one of its curves with first and second derivative.
+    pub fn curve_jet(&self, curve: &CurveRef, t: f64) -> Option<[DVec3; 3]> {
+        match self {
+            Self::Curve(c) => {
+                let [p, d, dd, _] = c.derivatives(t, 2);
+                Some([p, d, dd])
+            }
+            Self::Surface(surface) => {
+                let jet = surface.jet(self.curve_uv(curve, t)?, 2);
+                let along_u = match curve {
+                    CurveRef::Border(_, side) => matches!(side, Side::VMin | Side::VMax),
+                    CurveRef::Iso(_, fixed, _) => *fixed == Direction::V,
+                    CurveRef::Free(_) => return None,
+                };
+                Some(if along_u { [jet.p(), jet.u(), jet.d[2][0]] } else { [jet.p(), jet.v(), jet.d[0][2]] })
+            }
+        }
+    }
+}
+
+/// A curve as a polyline.
+#[derive(Clone, Debug)]
+pub struct DisplayCurve {
+    /// Which curve.
+    pub curve: CurveRef,
+    /// Points on it.
+    pub points: Vec<DVec3>,
+    /// Their parameters on it.
+    pub t: Vec<f64>,
+}
+
+/// One entity as triangles and lines, at one level of detail.
+#[derive(Clone, Debug)]
+pub struct Display {
+    /// How far triangles and lines are from the truth, in model units.
+    pub chord_tol: f64,
+    /// The triangles; none for a curve.
+    pub mesh: SurfaceMesh,
+    /// The tree over them.
+    pub tree: TriTree,
+    /// Borders first, then iso-lines; or the one free curve.
+    pub curves: Vec<DisplayCurve>,
+    /// The tree over the segments of `curves`.
+    pub segments: SegmentTree,
+    /// Whether a cap made it coarser than `chord_tol`.
+    pub capped: bool,
+}
+
+impl Display {
+    /// Makes it. Costs about a microsecond a vertex; meant for a worker when the model is large.
+    pub fn new(id: EntityId, geometry: &Geometry, chord_tol: f64) -> Self {
+        let (mesh, curves, capped) = match geometry {
+            Geometry::Surface(surface) => {
+                let (mesh, curves) = surface_display(id, surface, chord_tol);
+                let capped = mesh.capped;
+                (mesh, curves, capped)
+            }
+            Geometry::Curve(curve) => {
+                let (t, capped) = curve_parameters(curve, chord_tol);
+                let points = t.iter().map(|&t| curve.eval(t)).collect();
+                (SurfaceMesh::default(), vec![DisplayCurve { curve: CurveRef::Free(id), points, t }], capped)
+            }
+        };
+        let tree = TriTree::new(mesh.points.clone(), &mesh.triangles);
+        let segments = curves
+            .iter()
+            .enumerate()
+            .flat_map(|(k, c)| {
+                c.points.windows(2).zip(c.t.windows(2)).map(move |(p, t)| Segment {
+                    ends: [p[0], p[1]],
+                    t: [t[0], t[1]],
+                    curve: k as u32,
+                })
+            })
+            .collect();
+        Self { chord_tol, mesh, tree, curves, segments: SegmentTree::new(segments), capped }
+    }
+
+    /// The number of triangles.
+    pub fn triangle_count(&self) -> usize {
+        self.mesh.triangles.len()
+    }
+}
+
+/// The parameters at which iso-lines are drawn: the interior knots, thinned evenly when there are many, and the
+/// quarters of the domain where there are fewer than three knots.
+pub fn iso_parameters(knots: &Knots) -> Vec<f64> {
+    let breaks = knots.breaks();
+    let [start, end] = knots.domain();
+    let mut inner = breaks[1..breaks.len() - 1].to_vec();
+    if inner.len() > MAX_ISO {
+        let step = inner.len().div_ceil(MAX_ISO);
+        inner = inner.into_iter().skip(step / 2).step_by(step).collect();
+    }
+    if inner.len() < 3 {
+        for quarter in [0.25, 0.5, 0.75] {
+            let t = start + (end - start) * quarter;
+            if inner.iter().all(|b| (b - t).abs() > 0.1 * (end - start)) {
+                inner.push(t);
+            }
+        }
+        inner.sort_by(f64::total_cmp);
+    }
+    inner
+}
+
+fn surface_display(id: EntityId, surface: &Surface, chord_tol: f64) -> (SurfaceMesh, Vec<DisplayCurve>) {
+    let options = TessellateOptions { max_parts: MAX_PARTS, ..TessellateOptions::new(chord_tol) };
+    let (mut lines, capped) = grid_lines(surface, &options);
+    let iso = [0, 1].map(|k| iso_parameters(&surface.knots()[k]));
+    for (line, iso) in lines.iter_mut().zip(&iso) {
+        let width = line[line.len() - 1] - line[0];
+        for &t in iso {
+            // A grid line that is as good as there is moved: two lines a hair apart would make slivers.
+            match line.iter().position(|x| (x - t).abs() < 1e-9 * width) {
+                Some(at) => line[at] = t,
+                None => line.push(t),
+            }
+        }
+        line.sort_by(f64::total_cmp);
+    }
+    let mesh = tessellate_on(surface, lines, capped);
+    let (nu, nv) = (mesh.lines[0].len(), mesh.lines[1].len());
+    let row = |curve: CurveRef, j: usize| DisplayCurve {
+        curve,
+        points: mesh.points[j * nu..(j + 1) * nu].to_vec(),
+        t: mesh.lines[0].clone(),
+    };
+    let column = |curve: CurveRef, i: usize| DisplayCurve {
+        curve,
+        points: mesh.points.iter().skip(i).step_by(nu).copied().collect(),
+        t: mesh.lines[1].clone(),
+    };
+    let mut curves = vec![
+        row(CurveRef::Border(id, Side::VMin), 0),
+        column(CurveRef::Border(id, Side::UMax), nu - 1),
+        row(CurveRef::Border(id, Side::VMax), nv - 1),
+        column(CurveRef::Border(id, Side::UMin), 0),
+    ];
+    for (k, iso) in iso.iter().enumerate() {
+        for &c in iso {
+            let Some(at) = mesh.lines[k].iter().position(|&x| x == c) else { continue };
+            curves.push(if k == 0 {
+                column(CurveRef::Iso(id, Direction::U, c), at)
+            } else {
+                row(CurveRef::Iso(id, Direction::V, c), at)
+            });
+        }
+    }
+    // A border that is a point (a pole) is no curve.
+    curves.retain(|c| c.points.iter().any(|p| *p != c.points[0]));
+    (mesh, curves)
+}
+
+/// Parameters along a curve whose polyline keeps the chord tolerance, and whether the cap cut them short.
+fn curve_parameters(curve: &Curve, chord_tol: f64) -> (Vec<f64>, bool) {
+    let breaks = curve.knots().breaks();
+    let straight = curve.knots().degree() == 1;
+    let tol = chord_tol.max(f64::MIN_POSITIVE);
+    let parts: Vec<f64> = breaks
+        .windows(2)
+        .map(|pair| {
+            // A polynomial piece of degree 1 is straight; a rational one is as well, only unevenly run.
+            if straight {
+                return 1.0;
+            }
+            let h = pair[1] - pair[0];
+            let bend =
+                (0..=8).map(|i| curve.derivatives(pair[0] + h * f64::from(i) / 8.0, 2)[2].length()).fold(0.0, f64::max);
+            (1.2 * bend * h * h / (8.0 * tol)).sqrt().ceil().max(2.0)
+        })
+        .collect();
+    let total: f64 = parts.iter().sum();
+    let scale = (MAX_SEGMENTS as f64 / total).min(1.0);
+    let mut out = vec![breaks[0]];
+    for (pair, n) in breaks.windows(2).zip(&parts) {
+        let n = (n * scale).floor().max(1.0) as usize;
+        out.extend((1..n).map(|i| pair[0] + (pair[1] - pair[0]) * i as f64 / n as f64));
+        out.push(pair[1]);
+    }
+    (out, scale < 1.0)
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use std::f64::consts::FRAC_1_SQRT_2;
+
+    use super::*;
+
+    /// The unit sphere as one rational biquadratic surface: u around (closed seam), v from pole to pole.
+    pub(crate) fn sphere() -> Surface {
+        let w = FRAC_1_SQRT_2;
+        let circle = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (1, 0)];
+        let arc = [(0.0, -1.0, 1.0), (1.0, -1.0, w), (1.0, 0.0, 1.0), (1.0, 1.0, w), (0.0, 1.0, 1.0)];
+        let (mut points, mut weights) = (Vec::new(), Vec::new());
+        for (r, z, wv) in arc {
+            for (i, &(x, y)) in circle.iter().enumerate() {
+                points.push(DVec3::new(r * f64::from(x), r * f64::from(y), z));
+                weights.push(wv * if i % 2 == 1 { w } else { 1.0 });
+            }
+        }
+        let ku = Knots::clamped(2, &[0.0, 1.0, 2.0, 3.0, 4.0], 2).unwrap();
+        let kv = Knots::clamped(2, &[0.0, 1.0, 2.0], 2).unwrap();
+        Surface::new(ku, kv, points, Some(weights)).unwrap()
+    }
+
+    /// A quarter circle of radius 1.
+    fn arc() -> Curve {
+        let points = vec![DVec3::X, DVec3::X + DVec3::Y, DVec3::Y];
+        Curve::new(Knots::bezier(2, 0.0, 1.0).unwrap(), points, Some(vec![1.0, FRAC_1_SQRT_2, 1.0])).unwrap()
+    }
+
+    #[test]
+    fn lines_lie_in_the_triangles_and_on_the_surface() {
+        let id = EntityId(3);
+        let geometry = Geometry::Surface(Arc::new(sphere()));
+        let display = Display::new(id, &geometry, 1e-2);
+        // Two poles are points, so of the four borders the two sides of the seam are left.
+        let borders: Vec<_> = display.curves.iter().filter(|c| matches!(c.curve, CurveRef::Border(..))).collect();
+        assert_eq!(borders.len(), 2);
+        assert_eq!(borders[0].points, borders[1].points, "the seam has no slit");
+        for curve in &display.curves {
+            for (p, &t) in curve.points.iter().zip(&curve.t) {
+                assert!(display.mesh.points.contains(p));
+                let [on, along, _] = geometry.curve_jet(&curve.curve, t).unwrap();
+                assert!(on.distance(*p) < 1e-12);
+                assert!(along.dot(on).abs() < 1e-9, "tangents of a sphere are square to the radius");
+            }
+        }
+        let segments: usize = display.curves.iter().map(|c| c.points.len() - 1).sum();
+        assert_eq!(display.segments.len(), segments);
+    }
+
+    #[test]
+    fn a_free_curve_keeps_its_chord_tolerance() {
+        for tol in [1e-2, 1e-4, 1e-6] {
+            let geometry = Geometry::Curve(Arc::new(arc()));
+            let display = Display::new(EntityId(0), &geometry, tol);
+            let curve = &display.curves[0];
+            for pair in curve.points.windows(2) {
+                let sag = 1.0 - (0.5 * (pair[0] + pair[1])).length();
+                assert!(sag <= tol, "{sag} at {tol}");
+            }
+            let fewest = std::f64::consts::FRAC_PI_2 / (2.0 * (2.0 * tol).sqrt());
+            assert!((curve.points.len() as f64) < 3.0 * fewest + 3.0, "no waste: {}", curve.points.len());
+            assert!(!display.capped);
+        }
+        assert!(Display::new(EntityId(0), &Geometry::Curve(Arc::new(arc())), 1e-12).capped);
+    }
+
+    #[test]
+    fn iso_lines_are_neither_none_nor_a_thicket() {
+        let bezier = Knots::bezier(3, 0.0, 1.0).unwrap();
+        assert_eq!(iso_parameters(&bezier), [0.25, 0.5, 0.75]);
+        let many: Vec<f64> = (0..=200).map(f64::from).collect();
+        let found = iso_parameters(&Knots::clamped(3, &many, 1).unwrap());
+        assert!(found.len() >= 8 && found.len() <= MAX_ISO && found.iter().all(|t| many.contains(t)));
+        let one = Knots::clamped(3, &[0.0, 0.5, 1.0], 1).unwrap();
+        assert_eq!(iso_parameters(&one), [0.25, 0.5, 0.75]);
+    }
+}

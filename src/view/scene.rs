@@ -1,0 +1,377 @@
+//! The document as things to draw and to pick, each kept until its geometry or its size on the screen changes.
+//!
+//! [`Scene::sync`] follows the document: what is the same geometry in memory keeps its triangles. [`Scene::wanted`]
+//! lists what is too coarse or far too fine for a view, worst first; each [`Request`] is made in a worker or at once
+//! and handed back with [`Scene::accept`], which drops what the document no longer has. Until then the old
+//! triangles stay: nothing flashes empty. Tolerances are powers of four, so a model in steady view asks for nothing.
+
+use std::sync::Arc;
+
+use glam::DVec2;
+
+use super::display::{CurveRef, Display, Geometry};
+use super::viewport::View;
+use crate::kernel::geom::Aabb;
+use crate::model::document::{Document, Entity, EntityId, Shape};
+
+/// How far triangles and lines may be from the truth, in pixels.
+const PIXELS: f64 = 0.3;
+/// The coarsest and finest chord tolerance, as fractions of the diagonal of the entity's box.
+const COARSEST: f64 = 0.01;
+const FINEST: f64 = 1e-7;
+/// The tolerance of the first display of an entity, as a fraction of the diagonal of its box.
+const FIRST: f64 = 1e-3;
+/// How many vertices are looked at to see how large an item is in the picture.
+const VERTICES: usize = 1000;
+
+/// What an item is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ItemKind {
+    /// A surface of the model.
+    Surface,
+    /// A healed patch.
+    Patch,
+    /// A free curve.
+    Curve,
+}
+
+/// One entity, ready to be drawn and picked.
+#[derive(Clone, Debug)]
+pub struct Item {
+    /// The entity as the document has it.
+    pub entity: Arc<Entity>,
+    /// What it is.
+    pub kind: ItemKind,
+    /// Its number among the file's surfaces or curves; none for a patch.
+    pub number: Option<usize>,
+    /// Its shape.
+    pub geometry: Geometry,
+    /// A box around its control points.
+    pub bounds: Aabb,
+    /// Triangles and lines; none until the first request has been accepted.
+    pub display: Option<Arc<Display>>,
+    /// Changes whenever `display` does and is never used twice; 0 while there is none.
+    pub revision: u64,
+}
+
+impl Item {
+    /// Its name for programs.
+    pub fn id(&self) -> EntityId {
+        self.entity.id
+    }
+
+    /// Whether it is drawn.
+    pub fn visible(&self) -> bool {
+        self.entity.visible
+    }
+}
+
+/// A display to be made.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// Of which entity.
+    pub id: EntityId,
+    /// Its shape.
+    pub geometry: Geometry,
+    /// The chord tolerance.
+    pub chord_tol: f64,
+}
+
+/// A display that was made.
+#[derive(Clone, Debug)]
+pub struct Made {
+    id: EntityId,
+    geometry: Geometry,
+    display: Arc<Display>,
+}
+
+impl Request {
+    /// Does the work.
+    pub fn run(self) -> Made {
+        let display = Arc::new(Display::new(self.id, &self.geometry, self.chord_tol));
+        Made { id: self.id, geometry: self.geometry, display }
+    }
+}
+
+/// Everything that can be drawn and picked. See the module's text.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    items: Vec<Item>,
+    revisions: u64,
+}
+
+impl Scene {
+    /// Follows the document. Returns whether anything changed.
+    pub fn sync(&mut self, document: &Document) -> bool {
+        let same = self.items.len() == document.entities().len()
+            && self.items.iter().zip(document.entities()).all(|(item, e)| Arc::ptr_eq(&item.entity, e));
+        if same {
+            return false;
+        }
+        let mut old: std::collections::HashMap<EntityId, Item> = self.items.drain(..).map(|i| (i.id(), i)).collect();
+        let mut numbers = [0, 0];
+        for entity in document.entities() {
+            let mut counted = |k: usize| {
+                numbers[k] += 1;
+                Some(numbers[k] - 1)
+            };
+            let (kind, number, geometry) = match &entity.shape {
+                Shape::Surface(s) => (ItemKind::Surface, counted(0), Geometry::Surface(Arc::clone(s))),
+                Shape::Patch(p) => (ItemKind::Patch, None, Geometry::Surface(Arc::clone(&p.surface))),
+                Shape::Curve(c) => (ItemKind::Curve, counted(1), Geometry::Curve(Arc::clone(c))),
+            };
+            let kept = old.remove(&entity.id).filter(|item| item.geometry.same(&geometry));
+            let (bounds, display, revision) = match kept {
+                Some(item) => (item.bounds, item.display, item.revision),
+                None => (geometry.bounds(), None, 0),
+            };
+            let entity = Arc::clone(entity);
+            self.items.push(Item { entity, kind, number, geometry, bounds, display, revision });
+        }
+        true
+    }
+
+    /// All items, in the order of the document.
+    pub fn items(&self) -> &[Item] {
+        &self.items
+    }
+
+    /// The item of an entity.
+    pub fn item(&self, id: EntityId) -> Option<&Item> {
+        // Ids grow along the document except after edits that reorder it, of which there are none today; the search
+        // falls back to looking at all.
+        match self.items.binary_search_by_key(&id, Item::id) {
+            Ok(at) => Some(&self.items[at]),
+            Err(_) => self.items.iter().find(|item| item.id() == id),
+        }
+    }
+
+    /// The item of a surface by its number in the file.
+    pub fn surface(&self, number: usize) -> Option<&Item> {
+        self.items.iter().find(|i| i.kind == ItemKind::Surface && i.number == Some(number))
+    }
+
+    /// The item that a curve belongs to.
+    pub fn curve_item(&self, curve: &CurveRef) -> Option<&Item> {
+        self.item(curve.entity())
+    }
+
+    /// A box around what is visible; around everything when nothing is.
+    pub fn bounds(&self) -> Aabb {
+        let visible = self.bounds_of(|item| item.visible());
+        if visible.is_empty() { self.bounds_of(|_| true) } else { visible }
+    }
+
+    /// A box around the items for which `which` is true. Displays give a tight one, control points a wide one.
+    pub fn bounds_of(&self, which: impl Fn(&Item) -> bool) -> Aabb {
+        self.items.iter().filter(|item| which(item)).fold(Aabb::EMPTY, |all, item| {
+            let tight = item.display.as_ref().map(|d| {
+                d.curves.iter().flat_map(|c| &c.points).chain(&d.mesh.points).fold(Aabb::EMPTY, |b, &p| b.with(p))
+            });
+            all.union(&tight.filter(|b| !b.is_empty()).unwrap_or(item.bounds))
+        })
+    }
+
+    /// The displays that a view is in want of, the worst first: visible items that have none, then those that are
+    /// too coarse, then those that are over sixteen times too fine. Items out of the picture want a coarse display
+    /// only, and only when they have none.
+    pub fn wanted(&self, view: &View) -> Vec<Request> {
+        let mut out: Vec<(f64, Request)> = Vec::new();
+        for item in self.items.iter().filter(|item| item.visible()) {
+            let diagonal = item.bounds.diagonal();
+            if !(diagonal > 0.0 && diagonal.is_finite()) {
+                // A shape that is a point: one display, whatever the view.
+                if item.display.is_none() {
+                    out.push((f64::INFINITY, self.request(item, 1.0)));
+                }
+                continue;
+            }
+            let pixel = smallest_pixel(item, view);
+            let tol = level((PIXELS * pixel).clamp(FINEST * diagonal, COARSEST * diagonal));
+            match &item.display {
+                // The first one says where the surface really is; only then is it worth being fine.
+                None => out.push((f64::INFINITY, self.request(item, tol.max(level(FIRST * diagonal))))),
+                Some(_) if pixel == f64::INFINITY => {}
+                Some(display) => {
+                    let ratio = display.chord_tol / tol;
+                    if ratio > 1.0 && !display.capped {
+                        out.push((ratio, self.request(item, tol)));
+                    } else if ratio < 1.0 / 16.0 {
+                        out.push((ratio, self.request(item, tol)));
+                    }
+                }
+            }
+        }
+        out.sort_by(|a, b| b.0.total_cmp(&a.0));
+        out.into_iter().map(|(_, request)| request).collect()
+    }
+
+    fn request(&self, item: &Item, chord_tol: f64) -> Request {
+        Request { id: item.id(), geometry: item.geometry.clone(), chord_tol }
+    }
+
+    /// Takes a display over; false when the document no longer has that shape.
+    pub fn accept(&mut self, made: Made) -> bool {
+        let Some(item) = self.items.iter_mut().find(|item| item.id() == made.id) else { return false };
+        if !item.geometry.same(&made.geometry) {
+            return false;
+        }
+        self.revisions += 1;
+        item.revision = self.revisions;
+        item.display = Some(made.display);
+        true
+    }
+
+    /// Makes everything that a view wants at once, on all threads. For pictures without a window and for tests.
+    pub fn refine(&mut self, view: &View) {
+        use rayon::prelude::*;
+        // A first display, then a fine one, then perhaps one more where the fine one came nearer to the eye.
+        for _ in 0..4 {
+            let made: Vec<Made> = self.wanted(view).into_par_iter().map(Request::run).collect();
+            if made.is_empty() {
+                return;
+            }
+            for made in made {
+                self.accept(made);
+            }
+        }
+    }
+
+    /// How many triangles and line segments its displays have.
+    pub fn counts(&self) -> (usize, usize) {
+        self.items
+            .iter()
+            .filter_map(|item| item.display.as_ref())
+            .fold((0, 0), |(t, s), d| (t + d.triangle_count(), s + d.segments.len()))
+    }
+}
+
+/// The smallest pixel on what the picture shows of an item: infinite when it shows nothing. The box alone says how small
+/// it could be; where that is too pessimistic (the eye is inside the box), the present triangles say how small
+/// it is, by their vertices in or near the picture and by nine lines of sight.
+fn smallest_pixel(item: &Item, view: &View) -> f64 {
+    let by_box = view.pixel_size_in(&item.bounds);
+    let Some(display) = item.display.as_ref().filter(|d| d.chord_tol > PIXELS * by_box && !d.mesh.points.is_empty())
+    else {
+        return by_box;
+    };
+    let size = DVec2::new(view.viewport.width, view.viewport.height);
+    let step = display.mesh.points.len().div_ceil(VERTICES);
+    let seen = display.mesh.points.iter().step_by(step).filter_map(|&p| {
+        let at = view.project(p).filter(|at| at.depth >= view.near)?;
+        let inside = at.pixel.cmpge(-0.5 * size).all() && at.pixel.cmple(1.5 * size).all();
+        inside.then_some(at.depth)
+    });
+    let hit = (0..9).filter_map(|k| {
+        let pixel = size * DVec2::new(f64::from(k % 3), f64::from(k / 3)) * 0.5;
+        let ray = view.ray(pixel);
+        let hit = display.tree.first_hit(ray.origin, ray.direction, f64::INFINITY)?;
+        Some(view.depth(ray.at(hit.t)))
+    });
+    let depth = seen.chain(hit).fold(f64::INFINITY, f64::min);
+    if depth == f64::INFINITY { f64::INFINITY } else { view.pixel_size_at(depth).max(by_box) }
+}
+
+/// The next smaller power of four.
+fn level(tol: f64) -> f64 {
+    4.0_f64.powf(tol.log(4.0).floor())
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::kernel::geom::Curve;
+    use crate::model::command::Command;
+    use crate::model::document::Unit;
+    use crate::view::camera::Camera;
+    use crate::view::display::tests::sphere;
+    use crate::view::viewport::Viewport;
+
+    fn document() -> Document {
+        let mut document = Document::new(Unit::Millimetre);
+        document.add("ball", Shape::Surface(Arc::new(sphere())), None);
+        let curve = Curve::segment(DVec3::X * 2.0, DVec3::Y * 2.0).unwrap();
+        document.add("line", Shape::Curve(Arc::new(curve)), None);
+        document.add("ball again", Shape::Surface(Arc::new(sphere())), None);
+        document
+    }
+
+    fn view(scene: &Scene) -> View {
+        let viewport = Viewport::new(800.0, 600.0);
+        let mut camera = Camera::default();
+        camera.frame(&scene.bounds(), viewport);
+        View::new(&camera, viewport, &scene.bounds())
+    }
+
+    #[test]
+    fn only_what_changed_is_made_again() {
+        let document = document();
+        let mut scene = Scene::default();
+        assert!(scene.sync(&document));
+        assert!(!scene.sync(&document));
+        let view = view(&scene);
+        scene.refine(&view);
+        assert!(scene.wanted(&view).is_empty(), "a steady view wants nothing");
+        let before: Vec<u64> = scene.items().iter().map(|i| i.revision).collect();
+        let ids: Vec<EntityId> = document.entities().iter().map(|e| e.id).collect();
+        let hidden = Command::SetVisible { ids: vec![ids[0]], visible: false }.apply(&document).unwrap();
+        assert!(scene.sync(&hidden));
+        assert_eq!(scene.items().iter().map(|i| i.revision).collect::<Vec<_>>(), before);
+        assert!(!scene.items()[0].visible());
+        let deleted = Command::Delete { ids: vec![ids[1]] }.apply(&hidden).unwrap();
+        scene.sync(&deleted);
+        assert_eq!(scene.items().len(), 2);
+        assert_eq!(scene.surface(1).map(Item::id), Some(ids[2]));
+        assert_eq!(scene.item(ids[2]).unwrap().revision, before[2]);
+    }
+
+    #[test]
+    fn a_display_of_what_is_gone_is_dropped() {
+        let document = document();
+        let mut scene = Scene::default();
+        scene.sync(&document);
+        let view = view(&scene);
+        let made: Vec<Made> = scene.wanted(&view).into_iter().map(Request::run).collect();
+        assert_eq!(made.len(), 3);
+        scene.sync(&Document::default());
+        assert!(made.into_iter().all(|m| !scene.accept(m)));
+    }
+
+    #[test]
+    fn coming_closer_refines_and_going_away_coarsens() {
+        let mut scene = Scene::default();
+        scene.sync(&document());
+        let far = view(&scene);
+        scene.refine(&far);
+        let (coarse, _) = scene.counts();
+        let mut camera = far.camera;
+        camera.distance /= 8.0;
+        camera.target = DVec3::new(0.0, 0.0, 1.0);
+        let near = View::new(&camera, far.viewport, &scene.bounds());
+        assert!(!scene.wanted(&near).is_empty());
+        scene.refine(&near);
+        let (fine, _) = scene.counts();
+        assert!(fine > 4 * coarse, "{fine} {coarse}");
+        assert!(scene.wanted(&near).is_empty());
+        camera.distance *= 400.0;
+        let away = View::new(&camera, far.viewport, &scene.bounds());
+        scene.refine(&away);
+        assert!(scene.counts().0 < fine / 4);
+    }
+
+    #[test]
+    fn triangles_are_within_a_pixel_of_the_truth() {
+        let mut scene = Scene::default();
+        scene.sync(&document());
+        let view = view(&scene);
+        scene.refine(&view);
+        let display = scene.items()[0].display.clone().unwrap();
+        for t in &display.mesh.triangles {
+            let center: DVec3 = t.iter().map(|&k| display.mesh.points[k as usize]).sum::<DVec3>() / 3.0;
+            let pixel = view.pixel_size_at(view.depth(center));
+            assert!(1.0 - center.length() < PIXELS * pixel);
+        }
+    }
+}
