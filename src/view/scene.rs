@@ -194,9 +194,8 @@ impl Scene {
                 Some(_) if pixel == f64::INFINITY => {}
                 Some(display) => {
                     let ratio = display.chord_tol / tol;
-                    if ratio > 1.0 && !display.capped {
-                        out.push((ratio, self.request(item, tol)));
-                    } else if ratio < 1.0 / 16.0 {
+                    let too_coarse = ratio > 1.0 && !display.capped;
+                    if too_coarse || ratio < 1.0 / 16.0 {
                         out.push((ratio, self.request(item, tol)));
                     }
                 }

@@ -48,7 +48,7 @@ fn main() {
     let start = Instant::now();
     for item in scene.items().to_vec() {
         let request =
-            patchwright::view::scene::Request { id: item.id(), geometry: item.geometry.clone(), chord_tol: 3.3e-5 };
+            patchwright::view::scene::Request { id: item.id(), geometry: item.geometry.clone(), chord_tol: 1.7e-3 };
         scene.accept(request.run());
     }
     let build = start.elapsed();
