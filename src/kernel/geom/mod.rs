@@ -13,6 +13,7 @@ mod curve;
 mod differential;
 mod knots;
 mod surface;
+pub mod sweep;
 
 pub use aabb::Aabb;
 pub use bezier::BezierPatch;
