@@ -13,7 +13,7 @@ mod format;
 pub mod iges;
 pub mod obj;
 pub mod plot3d;
-mod report;
+pub(crate) mod report;
 pub mod step;
 pub mod stl;
 mod tidy;

@@ -1,3 +1,12 @@
-//! STEP files (ISO 10303, AP203, AP214, AP242).
+//! STEP files (ISO 10303, AP203, AP214, AP242): faces, shells, solids and bare geometry as surfaces and curves.
+//!
+//! Trimmed faces open as their untrimmed surfaces for now, and the report says so. Assemblies are placed, units
+//! taken over. Nothing is dropped silently: what the walk from the representations meets becomes geometry or a
+//! line of the report, and geometry that no representation reaches is counted there.
 
+mod access;
 pub mod part21;
+mod shapes;
+mod structure;
+
+pub use structure::read;
