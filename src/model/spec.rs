@@ -38,7 +38,7 @@ fn default_neighbours() -> usize {
 }
 
 /// One patch: four sides, in any order and direction.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PatchSpec {
     /// What it is called.
@@ -48,6 +48,47 @@ pub struct PatchSpec {
     pub boundary: [BoundaryMode; 4],
     /// The pieces of each side, in any order and direction.
     pub sides: [Vec<Piece>; 4],
+    /// What was decided by hand about how the sides meet; nothing when left out.
+    #[serde(default, skip_serializing_if = "Joining::is_default")]
+    pub joining: Joining,
+}
+
+/// What was decided by hand about how four sides meet.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Joining {
+    /// How the sides follow each other; the loop with the smallest gaps when left out.
+    pub arrangement: Option<Arrangement>,
+    /// What two ends may be apart and still be joined in this patch; the heal's when left out.
+    pub tol: Option<f64>,
+    /// Ends that are moved before the sides are joined.
+    pub moves: Vec<EndMove>,
+}
+
+impl Joining {
+    /// Whether nothing was decided by hand.
+    pub fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// How four sides follow each other: side `order[k]` (from 0) at place k, run backwards where `reversed[k]`. Backwards
+/// is against the direction in which its pieces are chained.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Arrangement {
+    /// The side at each place of the loop.
+    pub order: [usize; 4],
+    /// Whether it runs backwards there.
+    pub reversed: [bool; 4],
+}
+
+/// The end of a side that is nearest to a point is moved onto it; the displacement fades along its last piece.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EndMove {
+    /// Which side, from 0.
+    pub side: usize,
+    /// Where its end goes.
+    pub to: (f64, f64, f64),
 }
 
 /// What becomes of a picked boundary curve.
