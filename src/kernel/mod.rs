@@ -1,6 +1,7 @@
 //! Geometry and algorithms: plain functions over plain data, `f64`, no files, no window.
 
 pub mod geom;
+pub mod heal;
 pub mod job;
 pub mod mesh;
 pub mod mesh_ssi;

@@ -3,6 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
+pub use crate::kernel::heal::report::{BoundaryMode, HealStep, PatchReport};
+
 /// A whole heal: several patches with common settings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -91,16 +93,6 @@ pub struct EndMove {
     pub to: (f64, f64, f64),
 }
 
-/// What becomes of a picked boundary curve.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum BoundaryMode {
-    /// It stays as picked.
-    #[default]
-    Keep,
-    /// It is projected like the interior.
-    Project,
-}
-
 /// One piece of a side.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Piece {
@@ -153,36 +145,4 @@ pub enum IsoAt {
     U(f64),
     /// v is fixed; the curve runs along u.
     V(f64),
-}
-
-/// What was measured of a healed patch (lengths in model units).
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct PatchReport {
-    /// The largest distance to the originals at the check points, gaps left out.
-    pub max_error: f64,
-    /// The root mean square of those distances.
-    pub rms: f64,
-    /// The numbers of spans M, N.
-    pub resolution: [usize; 2],
-    /// How many resolutions were tried.
-    pub iterations: usize,
-    /// Samples with a projection on the originals.
-    pub projected: usize,
-    /// Of these, samples that had several and took the nearest.
-    pub several: usize,
-    /// Samples in gaps, filled by Hardy's method.
-    pub artificial: usize,
-    /// Resolution and error of each iteration.
-    pub history: Vec<HealStep>,
-    /// Whether the wanted error was reached.
-    pub reached: bool,
-}
-
-/// One iteration of the refinement.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct HealStep {
-    /// The numbers of spans M, N.
-    pub resolution: [usize; 2],
-    /// The largest error at them.
-    pub max_error: f64,
 }
