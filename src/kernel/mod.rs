@@ -1,5 +1,6 @@
 //! Geometry and algorithms: plain functions over plain data, `f64`, no files, no window.
 
+pub mod bvh;
 pub mod geom;
 pub mod heal;
 pub mod job;

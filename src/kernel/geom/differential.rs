@@ -183,7 +183,6 @@ mod tests {
     fn the_pole_of_a_sphere_has_its_limit_normal() {
         let s = revolved(&[(3.0, 0.0, 1.0), (3.0, 3.0, FRAC_1_SQRT_2), (0.0, 3.0, 1.0)]);
         for u in [0.0, 0.2, 0.5, 1.0] {
-            assert!(s.jet(DVec2::new(u, 1.0), 1).normal().is_none());
             assert!(unit_normal(&s, DVec2::new(u, 1.0)).unwrap().distance(DVec3::Z) < 1e-13);
         }
     }

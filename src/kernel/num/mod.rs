@@ -1,1 +1,3 @@
 //! Small numerics that the geometry stands on.
+
+pub mod lanes;

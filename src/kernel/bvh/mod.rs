@@ -1,0 +1,27 @@
+//! The hybrid bounding volume hierarchy: rectangle-swept spheres with osculating tori at the leaves.
+
+pub(crate) mod build;
+pub(crate) mod fit;
+pub(crate) mod net;
+mod node;
+pub(crate) mod osculate;
+mod patch_tree;
+mod rectangle;
+mod slots;
+mod top;
+mod torus;
+mod traverse;
+mod tree;
+mod validate;
+
+pub use build::Instructions;
+pub use node::{Node, NormalCone};
+pub use patch_tree::{Memory, PatchTree};
+pub use rectangle::Rectangle;
+pub use torus::{LeafTorus, OsculatingTorus, WholeTorus};
+pub use traverse::{Overlap, Pair, TraverseOptions, Verdict, early_exit, traverse};
+pub use tree::{BvhError, BvhOptions, MAX_EXTENT, MAX_HEIGHT, MIN_EXTENT, NodeId, SurfaceTree};
+pub use validate::{Broken, validate};
+
+#[cfg(test)]
+mod tests;
