@@ -1,6 +1,6 @@
 //! Real STEP files.
 
-use patchwright::io::{ImportReport, Severity, step};
+use patchwright::io::{ImportReport, Opened, Severity, step};
 use patchwright::model::document::{Document, Unit};
 
 fn read(name: &str) -> Option<(Document, ImportReport)> {
@@ -9,8 +9,7 @@ fn read(name: &str) -> Option<(Document, ImportReport)> {
         println!("skipped: no shared data ({name})");
         return None;
     };
-    let mut report = ImportReport::default();
-    let document = step::read(&String::from_utf8_lossy(&bytes), &mut report);
+    let Opened { document, report } = step::open(&bytes);
     println!("{name}: {:?}, {:?}", document.bounds(), report.lines);
     Some((document, report))
 }

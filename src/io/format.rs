@@ -7,6 +7,8 @@ use std::path::Path;
 pub enum Format {
     /// IGES 5.3, fixed 80-column ASCII.
     Iges,
+    /// STEP (ISO 10303-21); read only.
+    Step,
     /// This program's own project: RON.
     Project,
 }
@@ -20,6 +22,7 @@ impl Format {
         let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
         match name.rsplit_once('.')?.1 {
             "igs" | "iges" => Some(Self::Iges),
+            "stp" | "step" | "p21" => Some(Self::Step),
             "ron" => Some(Self::Project),
             _ => None,
         }
@@ -31,19 +34,23 @@ impl Format {
         if first.len() >= 73 && matches!(first[72], b'S' | b'G' | b'D') {
             return Some(Self::Iges);
         }
+        if super::step::part21::looks_like(bytes) {
+            return Some(Self::Step);
+        }
         let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes).trim_ascii_start();
         (text.starts_with(b"(") || text.starts_with(b"//") || text.starts_with(b"Project(")).then_some(Self::Project)
     }
 
     /// All formats for an error message.
     pub fn list() -> &'static str {
-        "IGES (.igs, .iges) or a project (.patchwright.ron)"
+        "IGES (.igs, .iges), STEP (.stp, .step; read only) or a project (.patchwright.ron)"
     }
 
     /// The name for people.
     pub fn name(self) -> &'static str {
         match self {
             Self::Iges => "IGES",
+            Self::Step => "STEP",
             Self::Project => "Patchwright project",
         }
     }
@@ -61,6 +68,7 @@ mod tests {
         let line = format!("{:72}S      1\r\n", "start");
         assert_eq!(Format::of_content(line.as_bytes()), Some(Format::Iges));
         assert_eq!(Format::of_content(b"\n\n(version: 1)"), Some(Format::Project));
+        assert_eq!(Format::of_content(b"ISO-10303-21;\nHEADER;"), Some(Format::Step));
         assert_eq!(Format::of_content(b"\x7fELF"), None);
         assert_eq!(Format::of_content(b""), None);
     }

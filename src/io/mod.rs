@@ -78,6 +78,12 @@ pub enum SaveError {
         /// What does not fit.
         source: iges::IgesWriteError,
     },
+    /// The format can be read but not written.
+    #[error("{} files cannot be written: save as IGES (.igs) or as a project (.patchwright.ron)", format.name())]
+    ReadOnly {
+        /// The format.
+        format: Format,
+    },
     /// The extension names no format that can be written.
     #[error("cannot tell the format of {} by its extension: expected {}", path.display(), Format::list())]
     Unknown {
@@ -110,6 +116,7 @@ pub fn open(path: &Path) -> Result<Opened, OpenError> {
     }
     match Format::of_content(&bytes).or_else(|| Format::of_name(path)) {
         Some(Format::Iges) => iges::read(&bytes).map_err(|source| OpenError::Iges { path: path.into(), source }),
+        Some(Format::Step) => Ok(step::open(&bytes)),
         Some(Format::Project) | None => Err(OpenError::Unknown { path: path.into() }),
     }
 }
@@ -126,6 +133,7 @@ pub fn save(path: &Path, document: &Document, options: &SaveOptions) -> Result<S
             atomic::write(path, text.as_bytes())?;
             Ok(saved)
         }
+        format @ Format::Step => Err(SaveError::ReadOnly { format }),
         Format::Project => Err(unknown()),
     }
 }

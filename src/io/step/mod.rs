@@ -10,3 +10,10 @@ mod shapes;
 mod structure;
 
 pub use structure::read;
+
+/// Reads the bytes of a file. Bytes that are not UTF-8 only spoil the strings in which they stand.
+pub fn open(bytes: &[u8]) -> crate::io::Opened {
+    let mut report = crate::io::ImportReport::default();
+    let document = read(&String::from_utf8_lossy(bytes), &mut report);
+    crate::io::Opened { document, report }
+}

@@ -410,7 +410,7 @@ fn escape(rest: &str) -> Option<(String, &str)> {
     for (start, width) in [("\\X2\\", 4), ("\\X4\\", 8)] {
         if let Some(tail) = rest.strip_prefix(start) {
             let end = tail.find("\\X0\\")?;
-            let hex = tail[..end].as_bytes();
+            let hex = &tail.as_bytes()[..end];
             let units: Option<Vec<u32>> =
                 hex.chunks(width).map(|unit| u32::from_str_radix(std::str::from_utf8(unit).ok()?, 16).ok()).collect();
             let units = units?;
