@@ -9,10 +9,12 @@ use std::path::{Path, PathBuf};
 use crate::model::document::Document;
 
 mod atomic;
+pub mod autosave;
 mod format;
 pub mod iges;
 pub mod obj;
 pub mod plot3d;
+pub mod project;
 pub(crate) mod report;
 pub mod step;
 pub mod stl;
@@ -56,6 +58,14 @@ pub enum OpenError {
         /// What is wrong with it.
         source: iges::IgesError,
     },
+    /// It is no project that can be read.
+    #[error("{} cannot be read: {source}", path.display())]
+    Project {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: project::ProjectError,
+    },
     /// Neither the content nor the extension is that of a format that can be read.
     #[error("{} is no file that can be read: expected {}", path.display(), Format::list())]
     Unknown {
@@ -83,6 +93,14 @@ pub enum SaveError {
     ReadOnly {
         /// The format.
         format: Format,
+    },
+    /// The document does not fit into a project.
+    #[error("cannot save {}: {source}", path.display())]
+    Project {
+        /// The file.
+        path: PathBuf,
+        /// What does not fit.
+        source: project::ProjectWriteError,
     },
     /// The extension names no format that can be written.
     #[error("cannot tell the format of {} by its extension: expected {}", path.display(), Format::list())]
@@ -117,7 +135,10 @@ pub fn open(path: &Path) -> Result<Opened, OpenError> {
     match Format::of_content(&bytes).or_else(|| Format::of_name(path)) {
         Some(Format::Iges) => iges::read(&bytes).map_err(|source| OpenError::Iges { path: path.into(), source }),
         Some(Format::Step) => Ok(step::open(&bytes)),
-        Some(Format::Project) | None => Err(OpenError::Unknown { path: path.into() }),
+        Some(Format::Project) => {
+            project::read(&bytes).map_err(|source| OpenError::Project { path: path.into(), source })
+        }
+        None => Err(OpenError::Unknown { path: path.into() }),
     }
 }
 
@@ -134,6 +155,10 @@ pub fn save(path: &Path, document: &Document, options: &SaveOptions) -> Result<S
             Ok(saved)
         }
         format @ Format::Step => Err(SaveError::ReadOnly { format }),
-        Format::Project => Err(unknown()),
+        Format::Project => {
+            let text = project::write(document).map_err(|source| SaveError::Project { path: path.into(), source })?;
+            atomic::write(path, text.as_bytes())?;
+            Ok(Saved { entities: document.entities().len(), notes: Vec::new() })
+        }
     }
 }

@@ -138,6 +138,18 @@ impl Document {
         Self { unit, ..Self::default() }
     }
 
+    /// A document of entities that have their ids already (read from a project). The ids must be distinct;
+    /// `next_id` is raised where an entity has it already.
+    pub fn from_parts(unit: Unit, entities: Vec<Entity>, next_id: u64) -> Self {
+        let used = entities.iter().map(|e| e.id.0.saturating_add(1)).max().unwrap_or(0);
+        Self { entities: Arc::new(entities.into_iter().map(Arc::new).collect()), unit, next_id: next_id.max(used) }
+    }
+
+    /// The id that the next entity gets.
+    pub fn next_id(&self) -> u64 {
+        self.next_id
+    }
+
     /// All entities, in file order.
     pub fn entities(&self) -> &[Arc<Entity>] {
         &self.entities
