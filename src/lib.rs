@@ -16,3 +16,7 @@ pub mod kernel;
 pub mod model;
 pub mod view;
 pub mod work;
+#[cfg(feature = "editor")]
+pub mod render;
+#[cfg(feature = "editor")]
+pub mod ui;

@@ -1,0 +1,32 @@
+//! The picture: wgpu and nothing else. This room knows no window and no toolkit; it draws plain data.
+//!
+//! - [`FrameData`] is one frame as plain data: a camera, display flags, and lists of meshes, lines and glyphs.
+//! - [`Renderer`] is immutable and long-lived: shaders and pipelines.
+//! - [`Viewport`] is one picture on screen: off-screen targets and GPU buffers that follow the data's revisions.
+//! - [`Offscreen`] renders a [`FrameData`] to an [`image::RgbaImage`] without a window.
+//!
+//! Meshes and lines are kept on the GPU under their [`Key`]; buffers are rebuilt only when the revision changes.
+//! Depth is reversed (1 at the near plane, 0 far away), colours are linear until the final blit, geometry is `f32`
+//! relative to an `f64` origin, so that models far from the origin do not jitter.
+
+mod cache;
+mod color;
+mod cull;
+mod encode;
+mod frame;
+mod gpu;
+mod offscreen;
+mod renderer;
+mod target;
+mod viewport;
+
+pub use color::{Color, ColorScale, MAX_STEPS, PALETTE, mix, srgb, to_srgb8, with_alpha};
+pub use encode::FrameStats;
+pub use frame::{
+    Background, CameraData, Dash, Display, Emphasis, Field, FrameData, Glyph, GlyphData, GlyphItem, GlyphShape, Hidden,
+    Key, LineData, LineItem, LineRole, LineStyle, MeshData, MeshItem, Section,
+};
+pub use gpu::{Gpu, GpuError};
+pub use offscreen::{Offscreen, OffscreenError};
+pub use renderer::{Renderer, shader_sources};
+pub use viewport::Viewport;

@@ -1,0 +1,3 @@
+//! The window: egui and nothing below it.
+
+pub mod paint;
