@@ -14,9 +14,9 @@ pub mod cli;
 pub mod io;
 pub mod kernel;
 pub mod model;
-pub mod view;
-pub mod work;
 #[cfg(feature = "editor")]
 pub mod render;
 #[cfg(feature = "editor")]
 pub mod ui;
+pub mod view;
+pub mod work;

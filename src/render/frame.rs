@@ -153,18 +153,16 @@ pub struct Section {
     pub normal: DVec3,
     /// Points with `normal . p > offset` are not drawn.
     pub offset: f64,
-    /// The colour of the line along which the plane cuts the surfaces.
-    pub cap: Color,
 }
 
 /// How much an item stands out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Emphasis {
+    /// Stepped back: paler and closer to the background.
+    Muted,
     /// As it is.
     #[default]
     Normal,
-    /// Stepped back: paler and closer to the background.
-    Muted,
     /// Under the cursor: brighter, lines one pixel wider.
     Hovered,
     /// Chosen: in the accent colour.

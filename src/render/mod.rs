@@ -1,6 +1,7 @@
 //! The picture: wgpu and nothing else. This room knows no window and no toolkit; it draws plain data.
 //!
 //! - [`FrameData`] is one frame as plain data: a camera, display flags, and lists of meshes, lines and glyphs.
+//! - [`Stage`] makes such a frame of a `view::scene::Scene`.
 //! - [`Renderer`] is immutable and long-lived: shaders and pipelines.
 //! - [`Viewport`] is one picture on screen: off-screen targets and GPU buffers that follow the data's revisions.
 //! - [`Offscreen`] renders a [`FrameData`] to an [`image::RgbaImage`] without a window.
@@ -17,7 +18,9 @@ mod frame;
 mod gpu;
 mod offscreen;
 mod renderer;
+mod stage;
 mod target;
+mod theme;
 mod viewport;
 
 pub use color::{Color, ColorScale, MAX_STEPS, PALETTE, mix, srgb, to_srgb8, with_alpha};
@@ -29,4 +32,6 @@ pub use frame::{
 pub use gpu::{Gpu, GpuError};
 pub use offscreen::{Offscreen, OffscreenError};
 pub use renderer::{Renderer, shader_sources};
+pub use stage::{Coloring, Look, Stage};
+pub use theme::Theme;
 pub use viewport::Viewport;
