@@ -7,5 +7,6 @@ pub mod job;
 pub mod mesh;
 pub mod mesh_ssi;
 pub mod num;
+pub mod self_ssi;
 pub mod ssi;
 pub mod tol;

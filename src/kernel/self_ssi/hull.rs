@@ -1,0 +1,364 @@
+//! Bounds over a rectangle of the domain: points whose convex hulls contain the surface, its first and its second
+//! partial derivatives there.
+//!
+//! Polynomial pieces: the control points of the restricted piece and their scaled differences. Rational pieces:
+//! control points of positive weight bound positions; derivatives come from interval arithmetic on
+//! S_u = (P_u - w_u S) / w and its derivatives, with P moved to a local origin so that the bound converges with the
+//! rectangle. Over many pieces the points are replaced by the corners of their box.
+
+use glam::{DVec2, DVec3, DVec4};
+
+use super::sheet::Sheet;
+use crate::kernel::geom::Aabb;
+
+/// Above this number of pieces a hull is a box.
+const MANY: usize = 4;
+
+/// A rectangle of the unit domain; in closed directions it may reach beyond [0, 1].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rect {
+    pub low: DVec2,
+    pub high: DVec2,
+}
+
+impl Rect {
+    pub fn new(low: DVec2, high: DVec2) -> Self {
+        Self { low, high }
+    }
+
+    pub fn size(&self) -> DVec2 {
+        self.high - self.low
+    }
+
+    pub fn center(&self) -> DVec2 {
+        (self.low + self.high) * 0.5
+    }
+
+    /// Grown on every side by `factor` times its own size.
+    pub fn grown(&self, factor: f64) -> Self {
+        let by = self.size() * factor;
+        Self { low: self.low - by, high: self.high + by }
+    }
+
+    pub fn union(&self, other: &Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
+    pub fn shifted(&self, by: DVec2) -> Self {
+        Self { low: self.low + by, high: self.high + by }
+    }
+
+    pub fn contains(&self, p: DVec2) -> bool {
+        self.low.cmple(p).all() && p.cmple(self.high).all()
+    }
+}
+
+/// Points around the surface and its first derivatives over a rectangle.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Hull {
+    pub pos: Vec<DVec3>,
+    pub du: Vec<DVec3>,
+    pub dv: Vec<DVec3>,
+}
+
+/// Points around the second derivatives: uu, uv, vv.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct SecondHull(pub [Vec<DVec3>; 3]);
+
+/// The range of `y . x` over points.
+pub(crate) fn range(y: DVec3, points: &[DVec3]) -> [f64; 2] {
+    points.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &x| {
+        let value = y.dot(x);
+        [low.min(value), high.max(value)]
+    })
+}
+
+impl Sheet {
+    /// The pieces under a rectangle with the part of it on each (moved into [0, 1] across a seam).
+    fn parts(&self, rect: &Rect) -> Vec<(usize, Rect)> {
+        let axis = |d: usize, low: f64, high: f64| -> Vec<(usize, f64, f64)> {
+            let last = self.breaks[d].len() - 2;
+            let (first_turn, last_turn) =
+                if self.periodic[d] { (low.floor() as i64, (high.ceil() as i64 - 1).max(low.floor() as i64)) } else { (0, 0) };
+            let mut out = Vec::new();
+            for turn in first_turn..=last_turn {
+                let (a, b) = (low - turn as f64, high - turn as f64);
+                for k in 0..=last {
+                    // End pieces continue beyond open borders.
+                    let start = if k == 0 && !self.periodic[d] { f64::NEG_INFINITY } else { self.breaks[d][k] };
+                    let end = if k == last && !self.periodic[d] { f64::INFINITY } else { self.breaks[d][k + 1] };
+                    let (from, to) = (a.max(start), b.min(end));
+                    if from < to {
+                        out.push((k, from, to));
+                    }
+                }
+            }
+            out
+        };
+        let us = axis(0, rect.low.x, rect.high.x);
+        let vs = axis(1, rect.low.y, rect.high.y);
+        let columns = self.columns();
+        vs.iter()
+            .flat_map(|&(j, v0, v1)| {
+                us.iter().map(move |&(i, u0, u1)| {
+                    (j * columns + i, Rect::new(DVec2::new(u0, v0), DVec2::new(u1, v1)))
+                })
+            })
+            .collect()
+    }
+
+    /// The piece on which a rectangle of [0, 1]^2 lies entirely.
+    pub fn single_piece(&self, rect: &Rect) -> Option<usize> {
+        let at = self.piece_at(rect.center());
+        let piece = &self.pieces[at];
+        let slack = DVec2::splat(1e-14);
+        (piece.low.cmple(rect.low + slack).all() && rect.high.cmple(piece.high + slack).all()).then_some(at)
+    }
+
+    /// Bounds over a rectangle of the surface.
+    pub fn hull(&self, rect: &Rect) -> Hull {
+        let parts = self.parts(rect);
+        if let [(piece, part)] = parts[..] {
+            return self.hull_on(piece, &part);
+        }
+        let mut all = Hull::default();
+        for (piece, part) in &parts {
+            let mut one = self.hull_on(*piece, part);
+            if parts.len() > MANY {
+                one = Hull { pos: corners(&one.pos), du: corners(&one.du), dv: corners(&one.dv) };
+            }
+            all.pos.extend(one.pos);
+            all.du.extend(one.du);
+            all.dv.extend(one.dv);
+        }
+        if parts.len() > MANY {
+            all = Hull { pos: corners(&all.pos), du: corners(&all.du), dv: corners(&all.dv) };
+        }
+        all
+    }
+
+    /// Bounds over a rectangle on one piece, continued where the rectangle leaves it.
+    pub fn hull_on(&self, piece: usize, rect: &Rect) -> Hull {
+        let net = self.net(piece, rect);
+        let size = rect.size();
+        if !self.rational {
+            let pos: Vec<DVec3> = net.iter().map(|h| h.truncate()).collect();
+            let (du, dv) = (self.differences(&pos, 0, size.x), self.differences(&pos, 1, size.y));
+            return Hull { pos, du, dv };
+        }
+        let Some(q) = Quotient::new(self, &net, size) else { return Hull::everything() };
+        Hull {
+            pos: net.iter().map(|h| h.truncate() / h.w).collect(),
+            du: q.first(0).corners(),
+            dv: q.first(1).corners(),
+        }
+    }
+
+    /// Bounds of the second derivatives over a rectangle of the surface.
+    pub fn second_hull(&self, rect: &Rect) -> SecondHull {
+        let mut all = SecondHull::default();
+        for (piece, part) in self.parts(rect) {
+            for (sum, one) in all.0.iter_mut().zip(self.second_hull_on(piece, &part).0) {
+                sum.extend(one);
+            }
+        }
+        all
+    }
+
+    /// Bounds of the second derivatives over a rectangle on one piece.
+    pub fn second_hull_on(&self, piece: usize, rect: &Rect) -> SecondHull {
+        let net = self.net(piece, rect);
+        let size = rect.size();
+        if !self.rational {
+            let pos: Vec<DVec3> = net.iter().map(|h| h.truncate()).collect();
+            let (p, q) = (self.degree[0], self.degree[1]);
+            let du = self.differences(&pos, 0, size.x);
+            let dv = self.differences(&pos, 1, size.y);
+            let uu = differences(&du, p, q + 1, 0, p - 1, size.x);
+            let uv = differences(&du, p, q + 1, 1, q, size.y);
+            let vv = differences(&dv, p + 1, q, 1, q - 1, size.y);
+            return SecondHull([uu, uv, vv]);
+        }
+        match Quotient::new(self, &net, size) {
+            Some(q) => SecondHull([q.second(0, 0, 0).corners(), q.second(1, 0, 1).corners(), q.second(2, 1, 1).corners()]),
+            None => SecondHull([0; 3].map(|_| Hull::everything().du)),
+        }
+    }
+
+    /// The homogeneous control points of a piece restricted (or continued) to a rectangle.
+    fn net(&self, piece: usize, rect: &Rect) -> Vec<DVec4> {
+        let piece = &self.pieces[piece];
+        let size = piece.size();
+        let (a, b) = ((rect.low - piece.low) / size, (rect.high - piece.low) / size);
+        let mut net = piece.points.clone();
+        let (width, height) = (self.degree[0] + 1, self.degree[1] + 1);
+        for j in 0..height {
+            restrict(&mut net, j * width, 1, width, a.x, b.x);
+        }
+        for i in 0..width {
+            restrict(&mut net, i, width, height, a.y, b.y);
+        }
+        net
+    }
+
+    fn differences(&self, net: &[DVec3], direction: usize, length: f64) -> Vec<DVec3> {
+        let (width, height) = (self.degree[0] + 1, self.degree[1] + 1);
+        differences(net, width, height, direction, self.degree[direction], length)
+    }
+}
+
+/// Restricts one line of control points to `a..b` in place.
+fn restrict(net: &mut [DVec4], start: usize, stride: usize, count: usize, a: f64, b: f64) {
+    let at = |i: usize| start + i * stride;
+    let keep_high = |net: &mut [DVec4], t: f64| {
+        for level in 1..count {
+            for i in 0..count - level {
+                net[at(i)] = net[at(i)] + (net[at(i + 1)] - net[at(i)]) * t;
+            }
+        }
+    };
+    let keep_low = |net: &mut [DVec4], t: f64| {
+        for level in 1..count {
+            for i in (level..count).rev() {
+                net[at(i)] = net[at(i - 1)] + (net[at(i)] - net[at(i - 1)]) * t;
+            }
+        }
+    };
+    // Cut first where more is left, so that the second cut never divides by a small length.
+    if b.abs() > (1.0 - a).abs() {
+        if b != 1.0 {
+            keep_low(net, b);
+        }
+        if a != 0.0 {
+            keep_high(net, a / b);
+        }
+    } else {
+        if a != 0.0 {
+            keep_high(net, a);
+        }
+        if b != 1.0 {
+            keep_low(net, (b - a) / (1.0 - a));
+        }
+    }
+}
+
+/// Differences of a `width` x `height` net along a direction, times degree over length: the derivative's net.
+fn differences(
+    net: &[DVec3],
+    width: usize,
+    height: usize,
+    direction: usize,
+    degree: usize,
+    length: f64,
+) -> Vec<DVec3> {
+    if degree == 0 {
+        return vec![DVec3::ZERO];
+    }
+    let factor = degree as f64 / length;
+    let (w, h, step) = if direction == 0 { (width - 1, height, 1) } else { (width, height - 1, width) };
+    (0..w * h)
+        .map(|k| (k / w) * width + k % w)
+        .map(|at| (net[at + step] - net[at]) * factor)
+        .collect()
+}
+
+/// The corners of the box around points.
+fn corners(points: &[DVec3]) -> Vec<DVec3> {
+    let b = Aabb::of(points.iter().copied());
+    Interval3 { low: b.min, high: b.max }.corners()
+}
+
+impl Hull {
+    /// The hull that excludes nothing.
+    fn everything() -> Self {
+        let huge = Interval3 { low: DVec3::splat(-1e30), high: DVec3::splat(1e30) }.corners();
+        Self { pos: huge.clone(), du: huge.clone(), dv: huge }
+    }
+}
+
+/// An interval of vectors.
+#[derive(Clone, Copy, Debug)]
+struct Interval3 {
+    low: DVec3,
+    high: DVec3,
+}
+
+impl Interval3 {
+    fn of(points: &[DVec3]) -> Self {
+        let b = Aabb::of(points.iter().copied());
+        Self { low: b.min, high: b.max }
+    }
+
+    fn corners(&self) -> Vec<DVec3> {
+        let pick = |bit: usize, k: usize| if k >> bit & 1 == 0 { self.low } else { self.high };
+        (0..8).map(|k| DVec3::new(pick(0, k).x, pick(1, k).y, pick(2, k).z)).collect()
+    }
+
+    fn minus(self, other: Self) -> Self {
+        Self { low: self.low - other.high, high: self.high - other.low }
+    }
+
+    fn times(self, [a, b]: [f64; 2]) -> Self {
+        let products = [self.low * a, self.low * b, self.high * a, self.high * b];
+        Self {
+            low: products.iter().fold(DVec3::INFINITY, |m, &p| m.min(p)),
+            high: products.iter().fold(DVec3::NEG_INFINITY, |m, &p| m.max(p)),
+        }
+    }
+}
+
+/// Quotient-rule bounds of one rational net.
+struct Quotient {
+    /// S minus the local origin.
+    s: Interval3,
+    over_w: [f64; 2],
+    p: [Interval3; 2],
+    pp: [Interval3; 3],
+    w: [[f64; 2]; 2],
+    ww: [[f64; 2]; 3],
+}
+
+impl Quotient {
+    /// `None` where a weight of the (continued) net is not positive.
+    fn new(sheet: &Sheet, net: &[DVec4], size: DVec2) -> Option<Self> {
+        let w_low = net.iter().fold(f64::INFINITY, |m, h| m.min(h.w));
+        let w_high = net.iter().fold(0.0, |m: f64, h| m.max(h.w));
+        if w_low.is_nan() || w_low <= 1e-3 * w_high {
+            return None;
+        }
+        let origin = net.iter().fold(DVec3::ZERO, |sum, h| sum + h.truncate() / h.w) / net.len() as f64;
+        let p: Vec<DVec3> = net.iter().map(|h| h.truncate() - origin * h.w).collect();
+        let w: Vec<DVec3> = net.iter().map(|h| DVec3::X * h.w).collect();
+        let s = Interval3::of(&p.iter().zip(net).map(|(&p, h)| p / h.w).collect::<Vec<_>>());
+        let (du, dv) = (sheet.degree[0], sheet.degree[1]);
+        let all = |net: &[DVec3]| {
+            let u = sheet.differences(net, 0, size.x);
+            let v = sheet.differences(net, 1, size.y);
+            let uu = differences(&u, du, dv + 1, 0, du - 1, size.x);
+            let uv = differences(&u, du, dv + 1, 1, dv, size.y);
+            let vv = differences(&v, du + 1, dv, 1, dv - 1, size.y);
+            [u, v, uu, uv, vv].map(|x| Interval3::of(&x))
+        };
+        let (a, b) = (all(&p), all(&w).map(|x| [x.low.x, x.high.x]));
+        Some(Self {
+            s,
+            over_w: [1.0 / w_high, 1.0 / w_low],
+            p: [a[0], a[1]],
+            pp: [a[2], a[3], a[4]],
+            w: [b[0], b[1]],
+            ww: [b[2], b[3], b[4]],
+        })
+    }
+
+    fn first(&self, d: usize) -> Interval3 {
+        self.p[d].minus(self.s.times(self.w[d])).times(self.over_w)
+    }
+
+    fn second(&self, at: usize, a: usize, b: usize) -> Interval3 {
+        self.pp[at]
+            .minus(self.first(a).times(self.w[b]))
+            .minus(self.first(b).times(self.w[a]))
+            .minus(self.s.times(self.ww[at]))
+            .times(self.over_w)
+    }
+}
