@@ -41,7 +41,8 @@ impl<'a> Assembler<'a> {
             let mut open = vec![(node, 0)];
             while let Some((end, depth)) = open.pop() {
                 let bound = self.bound(last, end);
-                if bound > tol && depth < 8
+                if bound > tol
+                    && depth < 8
                     && let Some(middle) = self.middle(last, end)
                 {
                     open.push((end, depth + 1));
@@ -129,8 +130,9 @@ impl<'a> Assembler<'a> {
             }
         }
         let local = |n: [f64; 4], turn: &[f64; 4]| {
-            let t: Vec<f64> =
-                (0..4).map(|k| if closed(k) { (n[k] - turn[k]).clamp(0.0, 1.0) } else { n[k].clamp(0.0, 1.0) }).collect();
+            let t: Vec<f64> = (0..4)
+                .map(|k| if closed(k) { (n[k] - turn[k]).clamp(0.0, 1.0) } else { n[k].clamp(0.0, 1.0) })
+                .collect();
             self.point([DVec2::new(t[0], t[1]), DVec2::new(t[2], t[3])])
         };
         let mut out: Vec<CurvePoint> = Vec::with_capacity(trace.nodes.len() + 4);

@@ -312,12 +312,21 @@ impl<'a> Search<'a> {
             return known;
         }
         let around = rect.grown(1.0);
-        let mut inside = self.miters.iter().flat_map(|m| self.images(m.at).map(move |at| (at, m))).filter(|(at, _)| around.contains(*at));
+        let mut inside = self
+            .miters
+            .iter()
+            .flat_map(|m| self.images(m.at).map(move |at| (at, m)))
+            .filter(|(at, _)| around.contains(*at));
         let only = inside.next();
         let proved = match (only, inside.next()) {
-            (Some((_, m)), None) if m.kind == MiterKind::CrossCap => {
-                cross_cap(&around, &self.sheet.hull(&around), &self.sheet.second_hull(&around), m.null(), m.first, m.second)
-            }
+            (Some((_, m)), None) if m.kind == MiterKind::CrossCap => cross_cap(
+                &around,
+                &self.sheet.hull(&around),
+                &self.sheet.second_hull(&around),
+                m.null(),
+                m.first,
+                m.second,
+            ),
             _ => false,
         };
         self.capped_window.insert(key(rect), proved);
@@ -392,13 +401,12 @@ impl<'a> Search<'a> {
             return;
         }
         let (extent_a, extent_b) = (extent(&ha), extent(&hb));
-        let (large, small) = if extent_a + a.rect.size().max_element() * 1e-3
-            >= extent_b + b.rect.size().max_element() * 1e-3
-        {
-            (a, b)
-        } else {
-            (b, a)
-        };
+        let (large, small) =
+            if extent_a + a.rect.size().max_element() * 1e-3 >= extent_b + b.rect.size().max_element() * 1e-3 {
+                (a, b)
+            } else {
+                (b, a)
+            };
         let ([first, middle, last], core) = self.children(&large);
         let inner = if large.grid.is_some() { core } else { middle };
         stack.extend([first, inner, last].into_iter().flatten().map(|child| Item::Pair(child, small)));
@@ -484,7 +492,8 @@ impl<'a> Search<'a> {
             let width: f64 = 0.5 * (to - from);
             let (mut least, mut outside, mut sure) = (f64::INFINITY, false, true);
             for c in 0..4 {
-                let (low, high) = if c < 2 { (limits[0][c], limits[1][c]) } else { (limits[2][c - 2], limits[3][c - 2]) };
+                let (low, high) =
+                    if c < 2 { (limits[0][c], limits[1][c]) } else { (limits[2][c - 2], limits[3][c - 2]) };
                 let margin = (z[c] - low).min(high - z[c]);
                 least = least.min(margin);
                 outside |= margin < -(reach[c] * width * half[c]) - 1e-9;
@@ -587,7 +596,10 @@ impl<'a> Search<'a> {
             let p = a.low + a.size() * DVec2::new(f64::from(k % 3) * 0.5, f64::from(k / 3) * 0.5);
             let s = self.sheet.jet_on(pa, p, 0).s;
             let (q, distance) = foot(self.sheet, pb, b.center(), s)?;
-            if distance > gap || !b.grown(1.5).contains(q) || (pa == pb && p.distance(q) < 1e-3 * a.size().max_element()) {
+            if distance > gap
+                || !b.grown(1.5).contains(q)
+                || (pa == pb && p.distance(q) < 1e-3 * a.size().max_element())
+            {
                 return None;
             }
             met |= b.grown(1e-9).contains(q);
@@ -639,10 +651,7 @@ fn solve_at(
     }
     let mut last = f64::INFINITY;
     for _ in 0..20 {
-        let (a, b) = (
-            sheet.jet_on(pa, DVec2::new(z[0], z[1]), 1),
-            sheet.jet_on(pb, DVec2::new(z[2], z[3]), 1),
-        );
+        let (a, b) = (sheet.jet_on(pa, DVec2::new(z[0], z[1]), 1), sheet.jet_on(pb, DVec2::new(z[2], z[3]), 1));
         let columns = [a.d[0], a.d[1], -b.d[0], -b.d[1]];
         let frame = DMat3::from_cols(columns[others[0]], columns[others[1]], columns[others[2]]);
         let d = frame.inverse() * (b.s - a.s);

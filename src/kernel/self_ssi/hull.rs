@@ -78,8 +78,11 @@ impl Sheet {
     fn parts(&self, rect: &Rect) -> Vec<(usize, Rect)> {
         let axis = |d: usize, low: f64, high: f64| -> Vec<(usize, f64, f64)> {
             let last = self.breaks[d].len() - 2;
-            let (first_turn, last_turn) =
-                if self.periodic[d] { (low.floor() as i64, (high.ceil() as i64 - 1).max(low.floor() as i64)) } else { (0, 0) };
+            let (first_turn, last_turn) = if self.periodic[d] {
+                (low.floor() as i64, (high.ceil() as i64 - 1).max(low.floor() as i64))
+            } else {
+                (0, 0)
+            };
             let mut out = Vec::new();
             for turn in first_turn..=last_turn {
                 let (a, b) = (low - turn as f64, high - turn as f64);
@@ -93,6 +96,11 @@ impl Sheet {
                     }
                 }
             }
+            // Slivers are the rounding of a border between two pieces.
+            let sliver = 1e-6 * (high - low);
+            if out.iter().any(|s| s.2 - s.1 > sliver) {
+                out.retain(|s| s.2 - s.1 > sliver);
+            }
             out
         };
         let us = axis(0, rect.low.x, rect.high.x);
@@ -100,9 +108,7 @@ impl Sheet {
         let columns = self.columns();
         vs.iter()
             .flat_map(|&(j, v0, v1)| {
-                us.iter().map(move |&(i, u0, u1)| {
-                    (j * columns + i, Rect::new(DVec2::new(u0, v0), DVec2::new(u1, v1)))
-                })
+                us.iter().map(move |&(i, u0, u1)| (j * columns + i, Rect::new(DVec2::new(u0, v0), DVec2::new(u1, v1))))
             })
             .collect()
     }
@@ -165,8 +171,12 @@ impl Sheet {
         all
     }
 
-    /// Bounds of the second derivatives over a rectangle on one piece.
+    /// Bounds of the second derivatives over a rectangle on one piece. Tiny rectangles are enlarged, because second
+    /// differences of nearly equal control points are rounding.
     pub fn second_hull_on(&self, piece: usize, rect: &Rect) -> SecondHull {
+        let least = self.pieces[piece].size() * 1e-4;
+        let half = (rect.size() * 0.5).max(least);
+        let rect = &Rect::new(rect.center() - half, rect.center() + half);
         let net = self.net(piece, rect);
         let size = rect.size();
         if !self.rational {
@@ -180,7 +190,9 @@ impl Sheet {
             return SecondHull([uu, uv, vv]);
         }
         match Quotient::new(self, &net, size) {
-            Some(q) => SecondHull([q.second(0, 0, 0).corners(), q.second(1, 0, 1).corners(), q.second(2, 1, 1).corners()]),
+            Some(q) => {
+                SecondHull([q.second(0, 0, 0).corners(), q.second(1, 0, 1).corners(), q.second(2, 1, 1).corners()])
+            }
             None => SecondHull([0; 3].map(|_| Hull::everything().du)),
         }
     }
@@ -243,23 +255,13 @@ fn restrict(net: &mut [DVec4], start: usize, stride: usize, count: usize, a: f64
 }
 
 /// Differences of a `width` x `height` net along a direction, times degree over length: the derivative's net.
-fn differences(
-    net: &[DVec3],
-    width: usize,
-    height: usize,
-    direction: usize,
-    degree: usize,
-    length: f64,
-) -> Vec<DVec3> {
+fn differences(net: &[DVec3], width: usize, height: usize, direction: usize, degree: usize, length: f64) -> Vec<DVec3> {
     if degree == 0 {
         return vec![DVec3::ZERO];
     }
     let factor = degree as f64 / length;
     let (w, h, step) = if direction == 0 { (width - 1, height, 1) } else { (width, height - 1, width) };
-    (0..w * h)
-        .map(|k| (k / w) * width + k % w)
-        .map(|at| (net[at + step] - net[at]) * factor)
-        .collect()
+    (0..w * h).map(|k| (k / w) * width + k % w).map(|at| (net[at + step] - net[at]) * factor).collect()
 }
 
 /// The corners of the box around points.

@@ -43,7 +43,7 @@ pub(crate) struct Pace {
     pub cap: usize,
 }
 
-const LONGEST: f64 = 0.05;
+const LONGEST: f64 = 0.02;
 const SHORTEST: f64 = 1e-10;
 
 /// Solves the 4 x 4 system `[j; row] d = [f, g]`.
@@ -160,13 +160,7 @@ pub(crate) fn turns(sheet: &Sheet, p: DVec2, q: DVec2) -> DVec2 {
 }
 
 /// Marches one way from a point on a branch, along the tangent with a positive product with `toward`.
-fn one_way(
-    sheet: &Sheet,
-    start: Chart,
-    toward: [DVec2; 2],
-    pace: &Pace,
-    job: &Job,
-) -> (Vec<[DVec2; 2]>, End) {
+fn one_way(sheet: &Sheet, start: Chart, toward: [DVec2; 2], pace: &Pace, job: &Job) -> (Vec<[DVec2; 2]>, End) {
     let first = start.points();
     let from_miter = matches!(start, Chart::Near(y) if y[3] == 0.0);
     let mut nodes = vec![first];
@@ -323,6 +317,23 @@ pub(crate) fn from_miter(sheet: &Sheet, m: DVec2, phi: f64, pace: &Pace, job: &J
     let e = DVec2::from_angle(phi);
     let (nodes, end) = one_way(sheet, Chart::Near([m.x, m.y, phi, 0.0]), [e, -e], pace, job);
     Trace { nodes, ends: [End::Miter(m), end] }
+}
+
+/// The two branches that start in a miter point through which two pass: (u, v, phi) moves by +- `split` for r = 1.
+pub(crate) fn from_crossing(sheet: &Sheet, m: DVec2, phi: f64, split: [f64; 3], pace: &Pace, job: &Job) -> Vec<Trace> {
+    const START: f64 = 1e-3;
+    [1.0, -1.0]
+        .into_iter()
+        .filter_map(|sign| {
+            let s = split.map(|x| x * sign * START);
+            let chart = Chart::Near([m.x + s[0], m.y + s[1], phi + s[2], START]);
+            let (chart, _) = correct(sheet, chart, &[0.0, 0.0, 0.0, 1.0], START)?;
+            let e = DVec2::from_angle(phi);
+            let (mut nodes, end) = one_way(sheet, chart, [e, -e], pace, job);
+            nodes.insert(0, [m, m]);
+            Some(Trace { nodes, ends: [End::Miter(m), end] })
+        })
+        .collect()
 }
 
 /// The branch through a pair that lies on it, both ways. `None` where the pair is singular.

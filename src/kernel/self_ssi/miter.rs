@@ -71,9 +71,8 @@ const CUSP_CELL: f64 = 1.0 / 64.0;
 /// Finds all miter points and cusp edges.
 pub(crate) fn find(sheet: &Sheet, job: &Job) -> Miters {
     let mut out = Miters::default();
-    let mut level: Vec<(usize, Rect)> = (0..sheet.pieces.len())
-        .map(|k| (k, Rect::new(sheet.pieces[k].low, sheet.pieces[k].high)))
-        .collect();
+    let mut level: Vec<(usize, Rect)> =
+        (0..sheet.pieces.len()).map(|k| (k, Rect::new(sheet.pieces[k].low, sheet.pieces[k].high))).collect();
     while !level.is_empty() {
         let mut next = Vec::new();
         for (piece, rect) in level {

@@ -212,6 +212,9 @@ pub fn self_intersect(
         result.unresolved.push(open([*rect; 2], "a miter point could not be separated from its surroundings"));
     }
     result.unresolved.extend(found.open.iter().map(|(pair, reason)| open(*pair, reason)));
+    for c in &found.coincident {
+        result.unresolved.push(open([c.a, c.b], "the surface coincides with itself here"));
+    }
     result.complete = result.unresolved.is_empty() && !found.capped && !job.is_cancelled();
     result.counts = Counts { leaf_pairs: found.leaf_pairs, nodes_built: found.hulls + miters.cells };
     let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
@@ -235,10 +238,12 @@ fn same(sheet: &Sheet, a: DVec2, b: DVec2) -> bool {
 /// The branches of a miter point that are not traced yet.
 fn branches(sheet: &Sheet, miter: &miter::MiterPoint, known: &[Trace], pace: &Pace, job: &Job) -> Vec<Trace> {
     let ended = known.iter().flat_map(|t| t.ends).any(|e| matches!(e, End::Miter(at) if same(sheet, at, miter.at)));
-    if ended || miter.kind != MiterKind::CrossCap {
-        return Vec::new();
+    match miter.kind {
+        _ if ended => Vec::new(),
+        MiterKind::CrossCap => vec![march::from_miter(sheet, miter.at, miter.phi, pace, job)],
+        MiterKind::TwoBranches => march::from_crossing(sheet, miter.at, miter.phi, miter.split, pace, job),
+        MiterKind::Isolated => Vec::new(),
     }
-    vec![march::from_miter(sheet, miter.at, miter.phi, pace, job)]
 }
 
 /// Whether Su x Sv vanishes all over.

@@ -19,7 +19,8 @@ pub(crate) fn quadrangle(sheet: &Sheet, miter: &MiterPoint, radius: f64) -> Opti
     }
     let (e, x) = (miter.null(), miter.null().perp());
     let s_x = miter.first[0] * x.x + miter.first[1] * x.y;
-    let mix = |d: &[DVec3; 3], a: DVec2, b: DVec2| d[0] * (a.x * b.x) + d[1] * (a.x * b.y + a.y * b.x) + d[2] * (a.y * b.y);
+    let mix =
+        |d: &[DVec3; 3], a: DVec2, b: DVec2| d[0] * (a.x * b.x) + d[1] * (a.x * b.y + a.y * b.x) + d[2] * (a.y * b.y);
     let bend = mix(&miter.second, e, e).length();
     let mut long = (radius / bend.max(1e-6)).sqrt().min(0.05);
     let mut short = (0.5 * radius / s_x.length().max(1e-6)).min(0.05);

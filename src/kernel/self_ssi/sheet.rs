@@ -6,7 +6,7 @@
 
 use glam::{DVec2, DVec3, DVec4};
 
-use crate::kernel::geom::{Aabb, MAX_DEGREE, Surface};
+use crate::kernel::geom::{MAX_DEGREE, Surface};
 
 /// The highest sum of degrees for which pieces are also kept in powers (conditioning gets poor beyond).
 const MAX_POWER_DEGREE: usize = 7;
@@ -44,18 +44,6 @@ pub(crate) struct Jet {
     pub d: [DVec3; 2],
     /// uu, uv, vv.
     pub dd: [DVec3; 3],
-}
-
-impl Jet {
-    /// The derivative in a direction of the domain.
-    pub fn along(&self, e: DVec2) -> DVec3 {
-        self.d[0] * e.x + self.d[1] * e.y
-    }
-
-    /// The second derivative in two directions of the domain.
-    pub fn along2(&self, e: DVec2, f: DVec2) -> DVec3 {
-        self.dd[0] * (e.x * f.x) + self.dd[1] * (e.x * f.y + e.y * f.x) + self.dd[2] * (e.y * f.y)
-    }
 }
 
 /// The prepared surface. See the module's text.
@@ -136,10 +124,9 @@ impl Sheet {
                 let (low, high) = (self.point(at(0.0)), self.point(at(1.0)));
                 apart = apart.max(low.distance(high));
                 extent = extent.max(low.distance(*first.get_or_insert(low)));
-                // A direction whose iso-curves are points is collapsed, not closed.
-                extent = extent.max(0.0);
             }
         }
+        // A direction whose iso-curves are points is collapsed, not closed.
         let middle = |s: f64| if d == 0 { DVec2::new(s, 0.5) } else { DVec2::new(0.5, s) };
         let around = (1..16).map(|k| self.point(middle(f64::from(k) / 16.0)).distance(self.point(middle(0.0))));
         apart <= gap && extent > 1e3 * gap && around.fold(0.0, f64::max) > 1e3 * gap
@@ -242,11 +229,6 @@ impl Sheet {
     pub fn to_model(&self, x: DVec3) -> DVec3 {
         self.origin + x * self.scale
     }
-
-    /// A box around the control points of a piece.
-    pub fn piece_bounds(&self, piece: usize) -> Aabb {
-        Aabb::of(self.pieces[piece].points.iter().map(|h| h.truncate() / h.w))
-    }
 }
 
 fn cartesian(h: &HomogeneousJet, rational: bool) -> Jet {
@@ -256,9 +238,8 @@ fn cartesian(h: &HomogeneousJet, rational: bool) -> Jet {
     let w = h.h.w;
     let s = h.h.truncate() / w;
     let d = h.d.map(|d| (d.truncate() - s * d.w) / w);
-    let second = |at: usize, a: usize, b: usize| {
-        (h.dd[at].truncate() - d[a] * h.d[b].w - d[b] * h.d[a].w - s * h.dd[at].w) / w
-    };
+    let second =
+        |at: usize, a: usize, b: usize| (h.dd[at].truncate() - d[a] * h.d[b].w - d[b] * h.d[a].w - s * h.dd[at].w) / w;
     Jet { s, d, dd: [second(0, 0, 0), second(1, 0, 1), second(2, 1, 1)] }
 }
 

@@ -90,11 +90,7 @@ pub(crate) fn cross_cap(
         let (xx, xe, ee) = (mixed(x, x), mixed(x, e), mixed(e, e));
         let tilt = sum(swept(xx, slope), xe);
         let bend = reach * 0.25 * (tilt[1] - tilt[0]);
-        let columns = [
-            tilt,
-            sum(swept(xe, slope), ee),
-            sum(sum(scaled(du, x.x), scaled(dv, x.y)), [-bend, bend]),
-        ];
+        let columns = [tilt, sum(swept(xe, slope), ee), sum(sum(scaled(du, x.x), scaled(dv, x.y)), [-bend, bend])];
         for (j, c) in columns.into_iter().enumerate() {
             let unit = if i == j { 1.0 } else { 0.0 };
             error[i][j] = (c[1] - unit).abs().max((c[0] - unit).abs());
