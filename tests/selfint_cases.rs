@@ -1,5 +1,7 @@
 //! Self-intersections judged against the shared cases: every arc once, both preimages matched, miter points exact.
 
+#![allow(clippy::unwrap_used, reason = "a test helper may stop the test")]
+
 use std::path::PathBuf;
 
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
