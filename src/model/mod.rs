@@ -2,6 +2,8 @@
 
 pub mod command;
 pub mod document;
+pub mod healing;
 pub mod history;
+pub mod resolve;
 pub mod selection;
 pub mod spec;

@@ -64,6 +64,12 @@ pub enum LoopError {
         /// How many other corners are open too.
         more: usize,
     },
+    /// What was decided by hand is no order of four sides.
+    #[error("the order {order:?} does not name each of the sides 0 to 3 once")]
+    Order {
+        /// What was given.
+        order: [usize; 4],
+    },
     /// Two sides meet away from their corner.
     #[error("sides {} and {} cross or touch at {at}, away from a corner", sides[0], sides[1])]
     Cross {
@@ -128,6 +134,11 @@ pub fn arrange(ends: &[[DVec3; 2]; 4]) -> (LoopChoice, Option<LoopChoice>) {
 
 /// Closes four sides into a loop. `forced` overrides the search.
 pub fn close(sides: &[SideCurve; 4], tolerance: f64, forced: Option<LoopChoice>) -> Result<BoundaryLoop, LoopError> {
+    if let Some(LoopChoice { order, .. }) = forced
+        && (0..4).any(|k| !order.contains(&k))
+    {
+        return Err(LoopError::Order { order });
+    }
     for (k, side) in sides.iter().enumerate() {
         let ends = side.ends();
         if side.length() <= tolerance {
@@ -336,5 +347,9 @@ mod tests {
         assert_eq!(other.order, closed.choice.order);
         assert_ne!(other.reversed, closed.choice.reversed);
         assert!(close(&square(), 1e-3, None).unwrap().alternative.is_none());
+        let forced = close(&sides, 0.9, Some(other)).unwrap();
+        assert_eq!((forced.choice, forced.alternative), (other, None));
+        let twice = LoopChoice { order: [0, 1, 1, 3], reversed: [false; 4] };
+        assert!(matches!(close(&sides, 0.9, Some(twice)), Err(LoopError::Order { .. })));
     }
 }

@@ -60,9 +60,29 @@ pub fn tangents(p: &[DVec3]) -> Vec<DVec3> {
         .collect()
 }
 
+/// The same where some samples were made up: a real sample takes its derivative from the run of real samples that
+/// it is in, if that has at least three, so that what fills a gap does not bend the surface beside it.
+pub fn tangents_in_runs(p: &[DVec3], real: &[bool]) -> Vec<DVec3> {
+    let mut out = tangents(p);
+    let mut start = 0;
+    while start < p.len() {
+        let end = (start..p.len()).find(|&k| real[k] != real[start]).unwrap_or(p.len());
+        if real[start] && end - start >= 3 && end - start < p.len() {
+            out[start..end].copy_from_slice(&tangents(&p[start..end]));
+        }
+        start = end;
+    }
+    out
+}
+
 /// The 3 M + 1 Bezier points of the C1 cubic through M + 1 points.
 pub fn bezier_row(points: &[DVec3]) -> Vec<DVec3> {
-    let d = tangents(points);
+    bezier_row_in_runs(points, &vec![true; points.len()])
+}
+
+/// The same where only some samples are real.
+pub fn bezier_row_in_runs(points: &[DVec3], real: &[bool]) -> Vec<DVec3> {
+    let d = tangents_in_runs(points, real);
     let mut out = vec![points[0]];
     for i in 1..points.len() {
         out.extend([points[i - 1] + d[i - 1] / 3.0, points[i] - d[i] / 3.0, points[i]]);
@@ -70,15 +90,16 @@ pub fn bezier_row(points: &[DVec3]) -> Vec<DVec3> {
     out
 }
 
-/// The Bezier net (3 M x 3 N spans) through a grid. `borders` are the Bezier points of the sides v = 0, u = 1,
+/// The Bezier net (3 M x 3 N spans) through a grid of points, of which some are real (see [`tangents_in_runs`]).
+/// `borders` are the Bezier points of the sides v = 0, u = 1,
 /// v = 1, u = 0 in increasing parameter, which belong to the edges and not to the patch.
-pub fn bezier_net(points: &Grid<DVec3>, borders: [&[DVec3]; 4], twist: Twist) -> Grid<DVec3> {
+pub fn bezier_net(points: &Grid<DVec3>, real: &Grid<bool>, borders: [&[DVec3]; 4], twist: Twist) -> Grid<DVec3> {
     let (m, n) = (points.m(), points.n());
-    let rows: Vec<Vec<DVec3>> = (0..=n).map(|j| tangents(points.row(j))).collect();
-    let columns: Vec<Vec<DVec3>> = (0..=m).map(|i| tangents(&points.column(i))).collect();
+    let rows: Vec<Vec<DVec3>> = (0..=n).map(|j| tangents_in_runs(points.row(j), real.row(j))).collect();
+    let columns: Vec<Vec<DVec3>> = (0..=m).map(|i| tangents_in_runs(&points.column(i), &real.column(i))).collect();
     let mixed: Vec<Vec<DVec3>> = (0..=m)
         .map(|i| match twist {
-            Twist::Scheme => tangents(&rows.iter().map(|r| r[i]).collect::<Vec<_>>()),
+            Twist::Scheme => tangents_in_runs(&rows.iter().map(|r| r[i]).collect::<Vec<_>>(), &real.column(i)),
             Twist::Zero => vec![DVec3::ZERO; n + 1],
         })
         .collect();
@@ -129,7 +150,8 @@ mod tests {
             bezier_row(points.row(n)),
             bezier_row(&points.column(0)),
         ];
-        surface(&bezier_net(points, [&borders[0], &borders[1], &borders[2], &borders[3]], twist)).unwrap()
+        surface(&bezier_net(points, &points.map(|_| true), [&borders[0], &borders[1], &borders[2], &borders[3]], twist))
+            .unwrap()
     }
 
     fn sampled(m: usize, n: usize, f: impl Fn(f64, f64) -> DVec3) -> Grid<DVec3> {
@@ -185,6 +207,26 @@ mod tests {
                 let low = s.jet((uv - h).max(DVec2::ZERO), 1);
                 let high = s.jet((uv + h).min(DVec2::ONE), 1);
                 assert!(low.u().distance(high.u()) < 1e-5 && low.v().distance(high.v()) < 1e-5);
+            }
+        }
+    }
+
+    #[test]
+    fn a_wrong_sample_in_a_gap_leaves_the_pieces_beside_it_alone() {
+        let f = |u: f64, v: f64| DVec3::new(u, v, u * u * v - v * v);
+        let grid = Grid::from_fn(12, 4, |i, j| {
+            f(i as f64 / 12.0, j as f64 / 4.0) + if i == 6 { DVec3::Z } else { DVec3::ZERO }
+        });
+        let real = Grid::from_fn(12, 4, |i, _| i != 6);
+        let row = |j: usize| bezier_row_in_runs(grid.row(j), real.row(j));
+        let column = |i: usize| bezier_row_in_runs(&grid.column(i), &real.column(i));
+        let borders = [row(0), column(12), row(4), column(0)];
+        let net = bezier_net(&grid, &real, [&borders[0], &borders[1], &borders[2], &borders[3]], Twist::Scheme);
+        let s = surface(&net).unwrap();
+        for i in (0..=100).filter(|i| !(42..=58).contains(i)) {
+            for j in 0..=20 {
+                let (u, v) = (f64::from(i) / 100.0, f64::from(j) / 20.0);
+                assert!(s.eval(DVec2::new(u, v)).distance(f(u, v)) < 1e-13);
             }
         }
     }

@@ -56,6 +56,10 @@ pub struct PatchInput {
     pub modes: [BoundaryMode; 4],
     /// How the sides follow each other; searched when `None`.
     pub choice: Option<LoopChoice>,
+    /// What two ends may be apart and still be joined in this patch; that of the options when `None`.
+    pub joining_tol: Option<f64>,
+    /// Ends moved before the sides are joined: the side, from 0, and where its nearest end goes.
+    pub moves: Vec<(usize, glam::DVec3)>,
 }
 
 /// How to heal. Lengths in model units.

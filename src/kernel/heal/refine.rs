@@ -9,7 +9,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::boundary_loop::{self, BoundaryLoop};
-use super::connect::{Topology, connect};
+use super::connect::{Edge, Topology, connect};
 use super::coons::coons;
 use super::deviation::{self, Reference};
 use super::fit;
@@ -40,17 +40,22 @@ pub(super) fn plan(patches: &[PatchInput], options: &HealOptions) -> Result<Plan
     }
     let mut loops = Vec::new();
     for patch in patches {
+        let tolerance = patch.joining_tol.unwrap_or(options.joining_tol);
         let mut sides = Vec::new();
         for (k, pieces) in patch.sides.iter().enumerate() {
-            let side = SideCurve::chain(pieces, options.joining_tol).map_err(|source| HealError::Side {
+            let mut side = SideCurve::chain(pieces, tolerance).map_err(|source| HealError::Side {
                 patch: patch.name.clone(),
                 side: k + 1,
                 source,
             })?;
+            for &(_, to) in patch.moves.iter().filter(|m| m.0 == k) {
+                let [a, b] = side.ends();
+                side = side.with_ends(if a.distance(to) <= b.distance(to) { [to, b] } else { [a, to] });
+            }
             sides.push(side);
         }
         let Ok(sides) = <[SideCurve; 4]>::try_from(sides) else { return Err(HealError::NoPatch) };
-        let closed = boundary_loop::close(&sides, options.joining_tol, patch.choice)
+        let closed = boundary_loop::close(&sides, tolerance, patch.choice)
             .map_err(|source| HealError::Loop { patch: patch.name.clone(), source })?;
         loops.push(closed);
     }
@@ -184,8 +189,7 @@ fn stage(
         return Ok(None);
     }
     let edges = edge_samples(plan, set, options, &on_curves, &grids, job);
-    let beziers: Vec<Vec<DVec3>> =
-        edges.iter().map(|samples| fit::bezier_row(&samples.iter().map(|s| s.point).collect::<Vec<_>>())).collect();
+    let beziers: Vec<Vec<DVec3>> = edges.iter().zip(&topology.edges).map(|(s, e)| edge_bezier(s, e)).collect();
     let mut patches = Vec::new();
     for (p, (grid, normals)) in grids.into_iter().enumerate() {
         let sides = sides_of(topology, &edges, p);
@@ -199,6 +203,7 @@ fn stage(
         let borders = sides_of(topology, &beziers, p);
         let net = fit::bezier_net(
             &samples.map(|s| s.point),
+            &samples.map(|s| s.status.is_projected()),
             [&borders[0], &borders[1], &borders[2], &borders[3]],
             options.twist,
         );
@@ -240,6 +245,13 @@ fn stage(
         patches.push(HealedPatch { name, surface, samples, coons: grid, slab: plan.slabs[p], deviation, report });
     }
     Ok(Some(Stage { patches }))
+}
+
+/// The Bezier points of an edge. On a kept curve every sample is real, wherever the originals are.
+fn edge_bezier(samples: &[Sample], edge: &Edge) -> Vec<DVec3> {
+    let points: Vec<DVec3> = samples.iter().map(|s| s.point).collect();
+    let real = |s: &Sample| edge.mode == BoundaryMode::Keep || s.status.is_projected();
+    fit::bezier_row_in_runs(&points, &samples.iter().map(real).collect::<Vec<_>>())
 }
 
 /// The kept sides of a patch in increasing parameter.
