@@ -287,6 +287,7 @@ mod tests {
             name: "nose".into(),
             boundary: [BoundaryMode::Keep, BoundaryMode::Project, BoundaryMode::Keep, BoundaryMode::Keep],
             sides: [side(), side(), side(), vec![Piece::Polyline(vec![(0.0, third, 1.0), (2.0, 3.0, 4.0)])]],
+            ..PatchSpec::default()
         };
         let report = PatchReport {
             max_error: 1e-5 * third,
