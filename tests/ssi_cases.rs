@@ -1,5 +1,7 @@
 //! Surface-surface intersection against oracles.
 
+#![allow(clippy::unwrap_used, reason = "a test helper may stop the test")]
+
 #[path = "support/cases.rs"]
 mod cases;
 #[path = "support/judge.rs"]

@@ -1,10 +1,10 @@
 //! Reads the shared cases: surfaces and what is true of them.
-#![allow(dead_code)]
+#![allow(dead_code, clippy::unwrap_used, reason = "a test helper may stop the test; not every test uses all")]
 
 use std::path::PathBuf;
 
 use glam::DVec3;
-use patchwright::kernel::geom::{Knots, Surface};
+use patchwright::kernel::geom::Surface;
 use serde_json::Value;
 
 /// The folder of the shared cases, or `None` (with a message) where it is missing.
@@ -28,13 +28,10 @@ pub struct Case {
 impl Case {
     pub fn load(name: &str) -> Option<Self> {
         let folder = folder()?;
-        let text = std::fs::read_to_string(folder.join(format!("{name}.igs"))).ok()?;
+        let opened = patchwright::io::open(&folder.join(format!("{name}.igs"))).ok()?;
         let oracle = std::fs::read_to_string(folder.join(format!("{name}.oracle.json"))).ok()?;
-        Some(Self {
-            name: name.to_owned(),
-            surfaces: surfaces(&text),
-            document: serde_json::from_str(&oracle).unwrap(),
-        })
+        let surfaces = opened.document.surfaces().map(|(_, s)| s.as_ref().clone()).collect();
+        Some(Self { name: name.to_owned(), surfaces, document: serde_json::from_str(&oracle).unwrap() })
     }
 
     /// How many of the surfaces belong to the first side.
@@ -51,37 +48,6 @@ impl Case {
         let (a, b) = all.split_at(self.n_a());
         [a.to_vec(), b.to_vec()]
     }
-}
-
-/// The entities 128 of an IGES file whose delimiters are the usual ones: all that the shared cases contain.
-fn surfaces(text: &str) -> Vec<Surface> {
-    let mut records: Vec<String> = vec![String::new()];
-    for line in text.lines().filter(|l| l.len() >= 73 && l.as_bytes()[72] == b'P') {
-        let last = records.last_mut().unwrap();
-        last.push_str(line[..64].trim_end());
-        if line[..64].trim_end().ends_with(';') {
-            records.push(String::new());
-        }
-    }
-    records.iter().filter(|r| r.starts_with("128")).map(|r| surface(r)).collect()
-}
-
-fn surface(record: &str) -> Surface {
-    let v: Vec<f64> =
-        record.trim_end_matches(';').split(',').map(|s| s.trim().replace(['D', 'd'], "e").parse().unwrap()).collect();
-    let int = |k: usize| v[k] as usize;
-    let (k1, k2, m1, m2) = (int(1), int(2), int(3), int(4));
-    let mut at = 10;
-    let mut take = |n: usize| {
-        at += n;
-        v[at - n..at].to_vec()
-    };
-    let ku = take(k1 + m1 + 2);
-    let kv = take(k2 + m2 + 2);
-    let count = (k1 + 1) * (k2 + 1);
-    let weights = take(count);
-    let points = take(3 * count).chunks(3).map(DVec3::from_slice).collect();
-    Surface::new(Knots::new(m1, ku).unwrap(), Knots::new(m2, kv).unwrap(), points, Some(weights)).unwrap()
 }
 
 /// The points of an oracle's list.

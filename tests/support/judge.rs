@@ -1,6 +1,6 @@
 //! Judges an intersection against an oracle, as the issue defines "right": every arc covered, nothing in excess, no
 //! duplicates, counts equal, every junction of the right degree, isolated points once.
-#![allow(dead_code)]
+#![allow(dead_code, clippy::unwrap_used, reason = "a test helper may stop the test; not every test uses all")]
 
 use glam::DVec3;
 use patchwright::kernel::ssi::Intersection;

@@ -40,7 +40,7 @@ impl Binormal {
     }
 
     /// A direction of the frame in space.
-    pub fn to_space(&self, d: DVec2) -> DVec3 {
+    pub fn in_space(&self, d: DVec2) -> DVec3 {
         self.frame[0] * d.x + self.frame[1] * d.y
     }
 }

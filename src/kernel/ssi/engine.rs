@@ -155,7 +155,7 @@ pub fn intersect(
 const SAME_ON_BORDER: f64 = 5e-7;
 
 fn on_border(node: &TraceNode) -> bool {
-    node.at.to_array().iter().any(|&x| x < 2.0 * SLACK || x > 1.0 - 2.0 * SLACK)
+    node.at.to_array().iter().any(|x| !(2.0 * SLACK..=1.0 - 2.0 * SLACK).contains(x))
 }
 
 /// Everything that is known while curves are traced.

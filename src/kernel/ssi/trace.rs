@@ -169,7 +169,7 @@ impl Tracer<'_> {
             Mode::Tangential => {
                 let found = binormal::polish(a, b, start, 0.05, true)?;
                 let (_, e, _) = found.principal();
-                let t = found.to_space(e.perp());
+                let t = found.in_space(e.perp());
                 (found.at, found.p, t, a.jet1(found.at.uv), b.jet1(found.at.st), 1.0)
             }
         };
