@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
-use super::{CliError, Common, Exit};
-use crate::io::{self, SaveOptions};
+use serde::Serialize;
+
+use super::{CliError, Common, Exit, info};
+use crate::io::{self, ImportReport, SaveOptions, Severity};
 
 /// Arguments of `convert`.
 #[derive(Debug, clap::Args)]
@@ -16,10 +18,25 @@ pub struct Args {
     pub output: PathBuf,
 }
 
-/// Runs `convert`.
+#[derive(Serialize)]
+struct Converted {
+    entities: usize,
+    notes: Vec<String>,
+    import: ImportReport,
+}
+
+/// Runs `convert`. What could not be read makes the result incomplete.
 pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
     let opened = io::open(&args.input)?;
+    info::say_report(&opened.report, Severity::Warning, common);
     let saved = io::save(&args.output, &opened.document, &SaveOptions::default())?;
+    saved.notes.iter().for_each(|note| common.say(format!("  note: {note}")));
     common.say(format!("{} entities written to {}", saved.entities, args.output.display()));
+    let lost = opened.report.count(Severity::Skipped);
+    common.json(&Converted { entities: saved.entities, notes: saved.notes, import: opened.report })?;
+    if lost > 0 {
+        common.warn(format!("{lost} entities of {} could not be read; see the lines above", args.input.display()));
+        return Ok(Exit::Incomplete);
+    }
     Ok(Exit::Done)
 }

@@ -1,22 +1,160 @@
-//! `patchwright info FILE`: what a file contains.
+//! `patchwright info FILE`: what a file contains, and what of it was not read.
 
 use std::path::PathBuf;
 
+use serde::Serialize;
+
 use super::{CliError, Common, Exit};
+use crate::io::{self, ImportReport, Severity};
+use crate::kernel::geom::{Aabb, Knots};
+use crate::model::document::{Entity, Shape};
 
 /// Arguments of `info`.
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// The file
     pub file: PathBuf,
+    /// List every entity, and every line of the import report
+    #[arg(long)]
+    pub all: bool,
+}
+
+#[derive(Serialize)]
+struct Info {
+    file: String,
+    unit: &'static str,
+    surfaces: usize,
+    curves: usize,
+    patches: usize,
+    bounds: Option<Bounds>,
+    entities: Vec<EntityInfo>,
+    import: ImportReport,
+}
+
+#[derive(Serialize)]
+struct Bounds {
+    min: [f64; 3],
+    max: [f64; 3],
+    diagonal: f64,
+}
+
+impl Bounds {
+    fn of(bounds: &Aabb) -> Option<Self> {
+        (!bounds.is_empty()).then(|| Self {
+            min: bounds.min.to_array(),
+            max: bounds.max.to_array(),
+            diagonal: bounds.diagonal(),
+        })
+    }
+}
+
+#[derive(Serialize)]
+struct EntityInfo {
+    id: u64,
+    kind: &'static str,
+    /// The number by which specifications and subcommands name it: its place among those of its kind.
+    number: usize,
+    name: String,
+    visible: bool,
+    color: Option<[f32; 3]>,
+    degree: Vec<usize>,
+    control_points: Vec<usize>,
+    spans: Vec<usize>,
+    domain: Vec<[f64; 2]>,
+    rational: bool,
+    bounds: Option<Bounds>,
+}
+
+impl EntityInfo {
+    fn of(entity: &Entity, number: usize) -> Self {
+        let (kind, knots, rational): (_, Vec<&Knots>, _) = match &entity.shape {
+            Shape::Surface(s) => ("surface", s.knots().iter().collect(), s.weights().is_some()),
+            Shape::Patch(p) => ("patch", p.surface.knots().iter().collect(), p.surface.weights().is_some()),
+            Shape::Curve(c) => ("curve", vec![c.knots()], c.weights().is_some()),
+        };
+        Self {
+            id: entity.id.0,
+            kind,
+            number,
+            name: entity.name.clone(),
+            visible: entity.visible,
+            color: entity.color,
+            degree: knots.iter().map(|k| k.degree()).collect(),
+            control_points: knots.iter().map(|k| k.control_count()).collect(),
+            spans: knots.iter().map(|k| k.breaks().len() - 1).collect(),
+            domain: knots.iter().map(|k| k.domain()).collect(),
+            rational,
+            bounds: Bounds::of(&entity.bounds()),
+        }
+    }
+
+    fn line(&self) -> String {
+        let product = |values: &[usize]| values.iter().map(usize::to_string).collect::<Vec<_>>().join(" x ");
+        let domain = self.domain.iter().map(|[a, b]| format!("{a}..{b}")).collect::<Vec<_>>().join(" x ");
+        format!(
+            "{} {} `{}`: degree {}, {} control points, {} spans, {domain}{}{}",
+            self.kind,
+            self.number,
+            self.name,
+            product(&self.degree),
+            product(&self.control_points),
+            product(&self.spans),
+            if self.rational { ", rational" } else { "" },
+            if self.visible { "" } else { ", hidden" },
+        )
+    }
 }
 
 /// Runs `info`.
 pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
-    let opened = crate::io::open(&args.file)?;
-    common.say(format!("{} surfaces, {} curves", opened.report.surfaces, opened.report.curves));
-    for (severity, entity, reason, count) in opened.report.grouped() {
-        common.say(format!("  {} {entity} x {count}: {reason}", severity.name()));
+    let opened = io::open(&args.file)?;
+    let document = &opened.document;
+    let bounds = document.bounds();
+    let mut numbers = [0; 3];
+    let entities: Vec<EntityInfo> = document
+        .entities()
+        .iter()
+        .map(|entity| {
+            let number = match entity.shape {
+                Shape::Surface(_) => &mut numbers[0],
+                Shape::Curve(_) => &mut numbers[1],
+                Shape::Patch(_) => &mut numbers[2],
+            };
+            *number += 1;
+            EntityInfo::of(entity, *number - 1)
+        })
+        .collect();
+    let [surfaces, curves, patches] = numbers;
+    let unit = document.unit.symbol();
+    common.say(format!("{}: {surfaces} surfaces, {curves} curves, {patches} patches", args.file.display()));
+    common.say(format!("unit: {}", if unit.is_empty() { "unknown" } else { unit }));
+    if let Some(b) = Bounds::of(&bounds) {
+        let point = |p: [f64; 3]| format!("({}, {}, {})", p[0], p[1], p[2]);
+        common.say(format!("box: {} to {}, diagonal {}", point(b.min), point(b.max), b.diagonal));
     }
+    if args.all {
+        entities.iter().for_each(|e| common.say(format!("  {}", e.line())));
+        opened.report.lines.iter().for_each(|line| common.say(format!("  {line}")));
+    } else {
+        say_report(&opened.report, Severity::Info, common);
+    }
+    common.json(&Info {
+        file: args.file.display().to_string(),
+        unit,
+        surfaces,
+        curves,
+        patches,
+        bounds: Bounds::of(&bounds),
+        entities,
+        import: opened.report,
+    })?;
     Ok(Exit::Done)
+}
+
+/// Prints the report from a severity on, equal lines counted together.
+pub fn say_report(report: &ImportReport, from: Severity, common: &Common) {
+    for (severity, entity, reason, count) in report.grouped().into_iter().filter(|line| line.0 >= from) {
+        let times = if count > 1 { format!(" ({count} times)") } else { String::new() };
+        common.say(format!("  {}: {entity}{times}: {reason}", severity.name()));
+    }
 }
