@@ -98,6 +98,9 @@ impl RawNet {
         let knots = &mut self.knots[d];
         let (Some(&first), Some(&last)) = (knots.first(), knots.last()) else { return };
         let slack = LEVEL * (last - first).abs();
+        if !slack.is_finite() {
+            return; // the knots are refused where they are checked
+        }
         let mut levelled = 0;
         for i in 1..knots.len() {
             if knots[i] < knots[i - 1] && knots[i - 1] - knots[i] <= slack {

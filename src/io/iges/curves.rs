@@ -1,11 +1,11 @@
 //! Lines (110), circular arcs (100) and composites (102).
 
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::TAU;
 
 use glam::DVec3;
 
 use super::params::Params;
-use crate::kernel::geom::{Curve, Knots};
+use crate::kernel::geom::{Curve, Knots, sweep};
 
 /// What ends of members may be apart and still be joined, as a fraction of the composite's size; the resolution
 /// that the file claims counts as well, up to [`LOOSEST`].
@@ -46,27 +46,15 @@ fn circular_arc(center: DVec3, start: DVec3, end: DVec3) -> Result<Curve, String
         return Err("its radius is zero or not finite".into());
     }
     let from = a.y.atan2(a.x);
-    let mut sweep = if start == end { TAU } else { (b.y.atan2(b.x) - from).rem_euclid(TAU) };
-    if sweep == 0.0 {
-        sweep = TAU;
+    let mut turn = if start == end { TAU } else { (b.y.atan2(b.x) - from).rem_euclid(TAU) };
+    if turn == 0.0 {
+        turn = TAU;
     }
-    let pieces = ((sweep / FRAC_PI_2 - 1e-9).ceil()).clamp(1.0, 4.0) as usize;
-    let step = sweep / pieces as f64;
-    let (mut points, mut weights, mut breaks) = (vec![start], vec![1.0], vec![from]);
-    for i in 1..=pieces {
-        let (last, next) = (points[points.len() - 1], from + step * i as f64);
-        let corner = next - 0.5 * step;
-        let on = |angle: f64, r: f64| center + DVec3::new(angle.cos(), angle.sin(), 0.0) * r;
-        points.push(on(corner, radius / (0.5 * step).cos()));
-        points.push(if i == pieces { end } else { on(next, radius) });
-        weights.extend([(0.5 * step).cos(), 1.0]);
-        breaks.push(next);
-        if last == points[points.len() - 1] && pieces > 1 {
-            return Err("its radius is lost in the rounding of its coordinates".into());
-        }
-    }
-    let knots = Knots::clamped(2, &breaks, 2).map_err(|e| e.to_string())?;
-    Curve::new(knots, points, Some(weights)).map_err(|e| e.to_string())
+    let arc = sweep::arc(center, DVec3::X * radius, DVec3::Y * radius, from, from + turn).map_err(|e| e.to_string())?;
+    let mut points = arc.points().to_vec();
+    let last = points.len() - 1;
+    (points[0], points[last]) = (start, end); // as the file has them, not as they round
+    Curve::new(arc.knots().clone(), points, arc.weights().map(<[f64]>::to_vec)).map_err(|e| e.to_string())
 }
 
 /// The members joined into as few curves as can be, in order; members that run against the others are turned

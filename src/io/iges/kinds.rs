@@ -68,7 +68,7 @@ pub(super) fn unread(kind: i64, consumed: bool) -> (Severity, String) {
         116 | 123 | 132 | 104 | 108 | 130 if consumed => {
             (Severity::Info, format!("{name}: only describes another entity"))
         }
-        202..=230 => (Severity::Skipped, format!("{name} is not read")),
+        202..=230 => (Severity::Info, format!("{name}: no geometry of the model, left out")),
         _ => (Severity::Skipped, format!("{name}: this type is not read")),
     }
 }

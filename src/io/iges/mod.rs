@@ -1,4 +1,4 @@
-//! IGES 5.3, fixed 80-column ASCII: surfaces 128 and 114, curves 126, 112, 110, 100 and 102 with transforms 124,
+//! IGES 5.3, fixed 80-column ASCII: surfaces 128, 114, 120 and 122, curves 126, 112, 110, 100 and 102 with transforms 124,
 //! units, colours 314 and names 406. Trimmed faces (144, 143, 510) open as their whole surfaces.
 //!
 //! Nothing in a file is trusted: counts are checked against the bytes that are there, pointers may lead nowhere
@@ -13,6 +13,7 @@ mod params;
 mod power_basis;
 mod sections;
 mod spline;
+mod sweeps;
 mod transform;
 mod uses;
 mod write;
@@ -31,15 +32,15 @@ use self::sections::{Line, Sections};
 use self::uses::Uses;
 use super::{ImportReport, Opened, Severity};
 use crate::kernel::geom::{Curve, Surface};
-use crate::model::document::{Document, EntityId, Shape};
+use crate::model::document::{Document, Entity, EntityId, Shape};
 
 /// Why a file is no IGES file that can be read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum IgesError {
     /// No line has a section letter where IGES has it.
-    #[error("none of its {lines} lines has a section letter (S, G, D, P) in column 73, as every line of IGES must")]
+    #[error("{lines} of its lines have no section letter (S, G, D, P, T) in column 73, and no line is an entity")]
     NotIges {
-        /// The number of lines.
+        /// The number of such lines.
         lines: usize,
     },
     /// There is no entity at all.
@@ -53,9 +54,11 @@ pub enum IgesError {
     Compressed,
 }
 
-/// How many members of composites are followed for each entity of the file: composites of composites could
-/// otherwise unfold without end.
-const MEMBERS_PER_ENTITY: usize = 4;
+/// How often the bytes of a file may be read over again for composites of composites and for surfaces that stand
+/// at several places: without a limit a small file could unfold without end.
+const UNFOLDING: usize = 4;
+/// The longest name that is kept, in characters.
+const LONGEST_NAME: usize = 200;
 
 /// Reads the bytes of a file.
 pub fn read(bytes: &[u8]) -> Result<Opened, IgesError> {
@@ -74,11 +77,14 @@ pub fn read(bytes: &[u8]) -> Result<Opened, IgesError> {
         report.add(Severity::Warning, "file", None, None, "there is no terminate section; the file may be cut off");
     }
     let directory = Directory::of(&sections.directory, &mut report);
+    if directory.entries.is_empty() {
+        let lines = sections.strays;
+        return Err(if lines > 0 { IgesError::NotIges { lines } } else { IgesError::NoEntities });
+    }
     for entry in &directory.entries {
         *report.found.entry(format!("IGES {}", entry.kind)).or_default() += 1;
     }
-    let document = Document::new(header.unit);
-    let members_left = MEMBERS_PER_ENTITY * directory.entries.len() + 1000;
+    let unfolding_left = UNFOLDING * bytes.len();
     let reader = Reader {
         sections,
         header,
@@ -87,8 +93,9 @@ pub fn read(bytes: &[u8]) -> Result<Opened, IgesError> {
         colors: HashMap::new(),
         first_line: None,
         report,
-        document,
-        members_left,
+        entities: Vec::new(),
+        counts: [0; 2],
+        unfolding_left,
     };
     Ok(reader.run())
 }
@@ -104,8 +111,10 @@ struct Reader<'a> {
     /// the directory was found to point elsewhere.
     first_line: Option<HashMap<usize, usize>>,
     report: ImportReport,
-    document: Document,
-    members_left: usize,
+    entities: Vec<Entity>,
+    /// Surfaces and curves so far.
+    counts: [usize; 2],
+    unfolding_left: usize,
 }
 
 /// What a record describes.
@@ -119,7 +128,7 @@ impl Reader<'_> {
         let uses = Uses::of(&mut self);
         for at in 0..self.directory.entries.len() {
             match self.directory.entries[at].kind {
-                128 | 114 => self.surface(at, &uses),
+                128 | 114 | 120 | 122 => self.surface(at, &uses),
                 126 | 112 | 110 | 100 | 102 => self.free_curve(at, &uses),
                 144 | 143 | 510 => self.face(at, &uses),
                 124 | 314 | 0 => {}
@@ -131,9 +140,8 @@ impl Reader<'_> {
             }
         }
         self.show_all_if_all_are_hidden();
-        self.report.surfaces = self.document.surfaces().count();
-        self.report.curves = self.document.curves().count();
-        Opened { document: self.document, report: self.report }
+        [self.report.surfaces, self.report.curves] = self.counts;
+        Opened { document: Document::from_parts(self.header.unit, self.entities, 0), report: self.report }
     }
 
     /// A report line on an entity.
@@ -205,6 +213,8 @@ impl Reader<'_> {
             let geometry = match kind {
                 128 => Geometry::Surfaces(spline::surface(params, notes)?),
                 114 => Geometry::Surfaces(power_basis::surface(params, resolution, notes)?),
+                120 => Geometry::Surfaces(vec![reader.revolution(params, depth)?]),
+                122 => Geometry::Surfaces(vec![reader.tabulated(params, depth)?]),
                 126 => Geometry::Curves(spline::curve(params, notes)?),
                 112 => Geometry::Curves(power_basis::curve(params, resolution, notes)?),
                 110 => one(curves::line(params)?),
@@ -212,10 +222,40 @@ impl Reader<'_> {
                 102 => Geometry::Curves(reader.composite(params, depth, notes)?),
                 other => return Err(format!("entity {other} has no curve or surface that can be read")),
             };
+            if params.ran_out {
+                return Err("its record is cut off: it ends without a delimiter".into());
+            }
             Ok((geometry, params.properties()))
         });
         self.warn_all(at, notes);
         read?
+    }
+
+    /// Takes so much from what may still be unfolded.
+    fn unfold(&mut self, cost: usize) -> Result<(), String> {
+        match self.unfolding_left.checked_sub(cost) {
+            Some(left) => self.unfolding_left = left,
+            None => return Err("the entities of this file refer to each other too often".into()),
+        }
+        Ok(())
+    }
+
+    /// The curves that a pointer inside another entity names, moved by their own transform.
+    fn placed_curves(&mut self, pointer: usize, depth: usize) -> Result<Vec<Curve>, String> {
+        if depth >= 16 {
+            return Err("entities are nested more than 16 deep, or lead back to themselves".into());
+        }
+        let Some(at) = self.directory.find(pointer) else { return Err(format!("entity {pointer} does not exist")) };
+        let entry = &self.directory.entries[at];
+        let transform = entry.transform;
+        self.unfold(64 * entry.parameter_lines.clamp(1, self.sections.parameter.len().max(1)))?;
+        match self.geometry(at, depth + 1)?.0 {
+            Geometry::Curves(curves) => match self.transform(transform)? {
+                Some(map) => Ok(curves.iter().map(|c| c.transformed(&map)).collect()),
+                None => Ok(curves),
+            },
+            Geometry::Surfaces(_) => Err(format!("entity {pointer} is no curve")),
+        }
     }
 
     /// The curves of a composite: its members, each moved by its own transform, joined.
@@ -225,35 +265,23 @@ impl Reader<'_> {
         depth: usize,
         notes: &mut Vec<String>,
     ) -> Result<Vec<Curve>, String> {
-        if depth > 16 {
-            return Err("composites are nested more than 16 deep, or lead back to themselves".into());
-        }
         let count = params.count("members", 1).map_err(|e| e.to_string())?;
         let pointers: Vec<usize> =
             (0..count).map(|_| params.pointer()).collect::<Result<_, _>>().map_err(|e| e.to_string())?;
         let mut members = Vec::new();
+        let mut lost: Option<(usize, String)> = None;
         for pointer in pointers {
-            if self.members_left == 0 {
-                return Err("composites of composites unfold into too many members".into());
-            }
-            self.members_left -= 1;
-            let Some(at) = self.directory.find(pointer) else {
-                notes.push(format!("member {pointer} does not exist"));
-                continue;
-            };
-            if matches!(self.directory.entries[at].kind, 116 | 132) {
+            let kind = self.directory.find(pointer).map(|at| self.directory.entries[at].kind);
+            if matches!(kind, Some(116 | 132)) {
                 continue; // a point between two members says nothing that the members do not
             }
-            match self.geometry(at, depth + 1).and_then(|(geometry, _)| {
-                let map = self.transform(self.directory.entries[at].transform)?;
-                Ok((geometry, map))
-            }) {
-                Ok((Geometry::Curves(curves), map)) => {
-                    members.extend(curves.into_iter().map(|c| map.map_or(c.clone(), |map| c.transformed(&map))));
-                }
-                Ok((Geometry::Surfaces(_), _)) => notes.push(format!("member {pointer} is no curve")),
-                Err(reason) => notes.push(format!("member {pointer} was left out: {reason}")),
+            match self.placed_curves(pointer, depth) {
+                Ok(curves) => members.extend(curves),
+                Err(reason) => lost.get_or_insert((0, reason)).0 += 1,
             }
+        }
+        if let Some((count, reason)) = lost {
+            notes.push(format!("{count} of its members cannot be read; the first: {reason}"));
         }
         if members.is_empty() {
             return Err("it has no member that can be read".into());
@@ -293,7 +321,13 @@ impl Reader<'_> {
         if places.is_empty() {
             places.push((0, None));
         }
-        for (_, face) in places {
+        let size: usize = geometry.iter().map(|s| 8 * s.points().len()).sum();
+        for (copy, (_, face)) in places.into_iter().enumerate() {
+            if copy > 0
+                && let Err(reason) = self.unfold(size)
+            {
+                return self.note(Severity::Skipped, at, format!("not opened at all of its places: {reason}"));
+            }
             let map = self.placement(at, face);
             let name = face.and_then(|face| self.name_of(face, uses.properties_of(face)));
             let name = name.or_else(|| self.name_of(at, &properties));
@@ -304,15 +338,7 @@ impl Reader<'_> {
                     self.note(Severity::Skipped, at, reason);
                     continue;
                 }
-                let number = self.document.surfaces().count();
-                self.add(
-                    Shape::Surface(Arc::new(moved)),
-                    face.unwrap_or(at),
-                    at,
-                    name.as_deref(),
-                    (part, count),
-                    || format!("Surface {number}"),
-                );
+                self.add(Shape::Surface(Arc::new(moved)), face.unwrap_or(at), at, name.as_deref(), (part, count));
             }
         }
     }
@@ -340,17 +366,14 @@ impl Reader<'_> {
                 self.note(Severity::Skipped, at, reason);
                 continue;
             }
-            let number = self.document.curves().count();
-            self.add(Shape::Curve(Arc::new(moved)), at, at, name.as_deref(), (part, count), || {
-                format!("Curve {number}")
-            });
+            self.add(Shape::Curve(Arc::new(moved)), at, at, name.as_deref(), (part, count));
         }
     }
 
     /// A face: its surface is opened where its own entry stands; here only the trimming is reported.
     fn face(&mut self, at: usize, uses: &Uses) {
         match uses.surface_of(at).map(|surface| (surface, self.directory.entries[surface].kind)) {
-            Some((_, 128 | 114)) => {
+            Some((_, 128 | 114 | 120 | 122)) => {
                 self.note(Severity::Info, at, "trimmed face, opened as its whole surface without the trimming");
             }
             Some((_, kind)) => {
@@ -361,26 +384,21 @@ impl Reader<'_> {
         }
     }
 
-    fn add(
-        &mut self,
-        shape: Shape,
-        owner: usize,
-        at: usize,
-        name: Option<&str>,
-        (part, parts): (usize, usize),
-        default_name: impl Fn() -> String,
-    ) -> EntityId {
-        let mut name = name.map_or_else(default_name, str::to_owned);
+    /// Adds an entity of the model, which shows like `owner` (the face, where there is one).
+    fn add(&mut self, shape: Shape, owner: usize, at: usize, name: Option<&str>, (part, parts): (usize, usize)) {
+        let (kind, count) = match shape {
+            Shape::Curve(_) => ("Curve", &mut self.counts[1]),
+            _ => ("Surface", &mut self.counts[0]),
+        };
+        let mut name = name.map_or_else(|| format!("{kind} {count}"), |n| n.chars().take(LONGEST_NAME).collect());
+        *count += 1;
         if parts > 1 {
             name = format!("{name} part {}", part + 1);
         }
         let color = self.color_of(owner).or_else(|| self.color_of(at));
         let visible = !self.directory.entries[owner].blanked;
-        let id = self.document.add(name, shape, color);
-        if !visible {
-            self.document.edit(id, |entity| entity.visible = false);
-        }
-        id
+        let id = EntityId(self.entities.len() as u64);
+        self.entities.push(Entity { id, name, shape, visible, color });
     }
 
     /// The name that a property gives, or else the label of the directory entry.
@@ -429,14 +447,11 @@ impl Reader<'_> {
 
     /// A file in which everything is marked hidden would open as nothing.
     fn show_all_if_all_are_hidden(&mut self) {
-        let hidden: Vec<EntityId> = self.document.entities().iter().filter(|e| !e.visible).map(|e| e.id).collect();
-        let all = self.document.entities().len();
-        if hidden.is_empty() || hidden.len() < all {
+        let all = self.entities.len();
+        if all == 0 || self.entities.iter().any(|e| e.visible) {
             return;
         }
-        for id in hidden {
-            self.document.edit(id, |entity| entity.visible = true);
-        }
+        self.entities.iter_mut().for_each(|e| e.visible = true);
         self.report.add(Severity::Warning, "file", None, None, format!("all {all} entities are hidden; all are shown"));
     }
 }

@@ -59,13 +59,15 @@ pub(super) struct Params<'a> {
     at: usize,
     delimiters: Delimiters,
     ended: bool,
+    /// Whether a value was asked for behind the last byte of a record that nothing closes.
+    pub ran_out: bool,
     /// The number of the value that comes next, from 0 (the entity type in parameter records).
     pub index: usize,
 }
 
 impl<'a> Params<'a> {
     pub fn new(bytes: &'a [u8], delimiters: Delimiters) -> Self {
-        Self { bytes, at: 0, delimiters, ended: false, index: 0 }
+        Self { bytes, at: 0, delimiters, ended: false, ran_out: false, index: 0 }
     }
 
     /// Whether the record is over: nothing but defaults follows.
@@ -83,6 +85,7 @@ impl<'a> Params<'a> {
             self.at += 1;
         }
         let start = self.at;
+        self.ran_out |= start == self.bytes.len();
         if let Some(text) = self.hollerith() {
             self.skip_to_delimiter();
             return Value::Text(text);
@@ -170,6 +173,11 @@ impl<'a> Params<'a> {
         }
         let rest = self.bytes[self.at..].split(|&b| b == self.delimiters.record).next().unwrap_or_default();
         1 + rest.iter().filter(|&&b| b == self.delimiters.value).count()
+    }
+
+    /// Whether the record is closed by its delimiter somewhere behind the cursor. Only right without strings.
+    pub fn is_closed(&self) -> bool {
+        self.ended || self.bytes[self.at..].contains(&self.delimiters.record)
     }
 
     /// The directory entry that a pointer names; 0 and left out mean none. Negative pointers are as positive ones.

@@ -126,6 +126,9 @@ pub(super) fn surface(
     // Every row ends with one more patch of arbitrary values, the grid with one more row of them. Some writers
     // leave them out.
     let padded = params.values_left() >= 48 * (m * (n + 1) - usize::from(m > 0));
+    if !padded && !params.is_closed() {
+        return Err("its record is cut off: it ends without a delimiter".into());
+    }
     let mut grid = Grid { m, n, bezier: Vec::with_capacity(m * n) };
     for i in 0..m {
         for j in 0..n {
