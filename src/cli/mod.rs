@@ -11,6 +11,7 @@ pub mod convert;
 mod error;
 mod exit;
 pub mod info;
+pub mod intersect;
 mod output;
 pub mod ranges;
 
@@ -43,6 +44,8 @@ pub enum Command {
     Info(info::Args),
     /// Convert a file into another format
     Convert(convert::Args),
+    /// Intersect two sets of surfaces
+    Intersect(intersect::Args),
 }
 
 /// Runs a subcommand and says on standard error why it failed, if it did.
@@ -56,6 +59,7 @@ pub fn run(command: &Command, common: &Common) -> Exit {
     let result = match command {
         Command::Info(args) => info::run(args, common),
         Command::Convert(args) => convert::run(args, common),
+        Command::Intersect(args) => intersect::run(args, common),
     };
     result.unwrap_or_else(|error| {
         common.warn(format!("error: {}", error.message()));

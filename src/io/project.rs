@@ -265,7 +265,7 @@ fn version_of(text: &str) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::spec::{BoundaryMode, HealStep, IsoAt, Joining, Piece};
+    use crate::model::spec::{BoundaryMode, HealStep, IsoAt, Piece};
 
     fn document() -> Document {
         let third = 1.0 / 3.0;
@@ -287,7 +287,7 @@ mod tests {
             name: "nose".into(),
             boundary: [BoundaryMode::Keep, BoundaryMode::Project, BoundaryMode::Keep, BoundaryMode::Keep],
             sides: [side(), side(), side(), vec![Piece::Polyline(vec![(0.0, third, 1.0), (2.0, 3.0, 4.0)])]],
-            joining: Joining::default(),
+            ..PatchSpec::default()
         };
         let report = PatchReport {
             max_error: 1e-5 * third,

@@ -1,8 +1,12 @@
 //! Intersection of triangulations (HJR99 section 4, ALGORITHMS section 5): trees, triangle pairs with exact
 //! signs, Point / PointUse / Segment topology, chains.
 
+pub mod border;
+pub mod engine;
+pub mod join;
 pub mod perturbed;
 pub mod refine;
+pub mod sheet;
 pub mod topology;
 pub mod trace;
 

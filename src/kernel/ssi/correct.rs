@@ -118,7 +118,7 @@ pub fn correct(
         }
         let step = solve4(rows)?;
         let length = (ja.u * step[0] + ja.v * step[1]).length() + (jb.u * step[2] + jb.v * step[3]).length();
-        if residual <= floor && (off <= floor || length >= last) {
+        if residual <= floor && (length <= 1e-13 || (off <= 1e-12 && length >= 0.5 * last)) {
             return Some(Corrected { at, a: ja, b: jb, residual });
         }
         for (value, step) in x.iter_mut().zip(step) {

@@ -1,0 +1,524 @@
+//! The intersection of two sets of surfaces, from pieces to curves with a certificate.
+//!
+//! 1. Descend through pairs of nodes ([`super::traverse`]); keep pairs with one arc, and fit gap functions where the
+//!    surfaces run nearly parallel ([`super::contact`]).
+//! 2. Polish contacts, find their arms ([`super::junction`]) and trace these first, then tangential curves, then
+//!    every seed that lies on no curve yet ([`super::trace`]).
+//! 3. What was neither proved empty nor traced is listed as unresolved. That list is the certificate: when it is
+//!    empty, every surviving pair of nodes was visited by a curve or belongs to a junction or a coincident region.
+
+use std::collections::HashMap;
+use std::time::Instant;
+
+use glam::{DVec2, DVec3};
+
+use super::binormal;
+use super::contact::{Cell, Findings, SLACK, Seed};
+use super::correct::{Condition, PointPair};
+use super::junction::{Contacted, arms_of};
+use super::output;
+use super::piece::Patch;
+use super::result::{Counts, CurveEnd, Intersection, Times, Unresolved};
+use super::side::{Frame, Side};
+use super::trace::{Disc, End, Mode, TraceNode, TraceOptions, Tracer};
+use super::traverse::{ArcPair, Traversal, traverse};
+use super::tree::Tree;
+use crate::kernel::geom::{Aabb, Surface};
+use crate::kernel::job::Job;
+use crate::kernel::tol::Tolerances;
+
+/// The settings of an intersection.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SsiOptions {
+    /// How closely curves follow, in model units. Default: 1e-6 of the diagonal of both sides together.
+    pub tol: Option<f64>,
+    /// The distance that counts as contact, in model units. Default: 1e-11 of the diagonal, never below rounding.
+    pub gap_tol: Option<f64>,
+    /// How far apart the borders of neighbouring patches of one side may be. Default: 1e-6 of the diagonal.
+    pub joining: Option<f64>,
+}
+
+/// Why nothing was computed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SsiError {
+    /// A tolerance is zero, negative or not a number.
+    #[error("{name} is {value}, but must be a positive length")]
+    Tolerance {
+        /// Which one.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// A tolerance is larger than the model.
+    #[error("{name} is {value}, larger than the model's diagonal of {diagonal}; choose a smaller one")]
+    TooLarge {
+        /// Which one.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The diagonal.
+        diagonal: f64,
+    },
+    /// A side has no surface.
+    #[error("side {side} has no surface")]
+    Empty {
+        /// `a` or `b`.
+        side: char,
+    },
+}
+
+/// How a chain of points ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChainEnd {
+    /// How.
+    pub end: CurveEnd,
+    /// In which contact.
+    pub contact: Option<usize>,
+}
+
+/// A traced curve.
+#[derive(Clone, Debug)]
+pub struct Chain {
+    /// Its points.
+    pub nodes: Vec<TraceNode>,
+    /// What kind of curve it is.
+    pub mode: Mode,
+    /// How it starts and ends.
+    pub ends: [ChainEnd; 2],
+}
+
+/// Intersects two sets of numbered surfaces.
+pub fn intersect(
+    a: &[(usize, &Surface)],
+    b: &[(usize, &Surface)],
+    options: &SsiOptions,
+    job: &Job,
+) -> Result<Intersection, SsiError> {
+    for (side, list) in [('a', a), ('b', b)] {
+        if list.is_empty() {
+            return Err(SsiError::Empty { side });
+        }
+    }
+    let bounds = a.iter().chain(b).fold(Aabb::EMPTY, |all, (_, s)| all.union(&s.bounds()));
+    let defaults = Tolerances::of(&bounds);
+    let diagonal = bounds.diagonal();
+    let checked = |name, value: Option<f64>, default: f64| match value {
+        None => Ok(default),
+        Some(value) if !(value > 0.0 && value.is_finite()) => Err(SsiError::Tolerance { name, value }),
+        Some(value) if value > diagonal && diagonal > 0.0 => Err(SsiError::TooLarge { name, value, diagonal }),
+        Some(value) => Ok(value),
+    };
+    let tol = checked("tol", options.tol, defaults.follow)?;
+    let gap_tol = checked("gap_tol", options.gap_tol, defaults.gap)?;
+    let joining = checked("joining", options.joining, 1e-6 * diagonal.max(f64::MIN_POSITIVE))?;
+    let clock = Instant::now();
+    let frame = Frame::of(&bounds);
+    let sides = [Side::new(a, &frame), Side::new(b, &frame)];
+    let trees = [Tree::new(&sides[0]), Tree::new(&sides[1])];
+    let build = clock.elapsed();
+    let mut engine = Engine {
+        sides,
+        trees,
+        frame,
+        gap: gap_tol * frame.scale,
+        trace: TraceOptions {
+            tol: 0.25 * tol * frame.scale,
+            floor: 4e-16 * frame.scale * (bounds.max_abs() + diagonal),
+            joining: joining * frame.scale,
+            most_points: 200_000,
+        },
+        contacts: Vec::new(),
+        chains: Vec::new(),
+        register: HashMap::new(),
+        border_segments: Vec::new(),
+        unresolved: Vec::new(),
+    };
+    job.phase("Finding where the surfaces meet");
+    let [ref left, ref right] = engine.sides;
+    let traversal = traverse([left, right], &mut engine.trees, engine.gap, job);
+    let traversed = clock.elapsed();
+    job.phase("Following curves");
+    engine.run(&traversal, job);
+    let mut result = output::assemble(&engine, tol);
+    result.counts = Counts {
+        leaf_pairs: traversal.arcs.len() + traversal.fits,
+        nodes_built: engine.trees.iter().map(|t| t.nodes.len()).sum(),
+    };
+    let total = clock.elapsed();
+    let ms = |d: std::time::Duration| d.as_secs_f64() * 1e3;
+    result.time_ms = Times { build: ms(build), traverse: ms(traversed - build), curves: ms(total - traversed) };
+    job.progress(1.0);
+    Ok(result)
+}
+
+/// How near a seed on a border must be to a curve on it to be one with it, in the unit frame.
+const SAME_ON_BORDER: f64 = 5e-7;
+
+fn on_border(node: &TraceNode) -> bool {
+    node.at.to_array().iter().any(|x| !(2.0 * SLACK..=1.0 - 2.0 * SLACK).contains(x))
+}
+
+/// Everything that is known while curves are traced.
+pub struct Engine {
+    /// The pieces of both sides.
+    pub sides: [Side; 2],
+    /// Their nodes.
+    pub trees: [Tree; 2],
+    /// The frame of all coordinates.
+    pub frame: Frame,
+    /// The distance that counts as contact.
+    pub gap: f64,
+    /// The settings of traces.
+    pub trace: TraceOptions,
+    /// Contacts with their arms.
+    pub contacts: Vec<Contacted>,
+    /// Curves.
+    pub chains: Vec<Chain>,
+    register: HashMap<(usize, usize), Vec<(usize, usize)>>,
+    border_segments: Vec<(usize, usize)>,
+    /// What could not be decided.
+    pub unresolved: Vec<Unresolved>,
+}
+
+impl Engine {
+    fn run(&mut self, traversal: &Traversal, job: &Job) {
+        for &(ia, ib, reason) in &traversal.unresolved {
+            let (a, b) = (&self.trees[0].nodes[ia], &self.trees[1].nodes[ib]);
+            let entry = self.unresolved_at([a.piece, b.piece], [a.low, a.high], [b.low, b.high], reason);
+            self.unresolved.push(entry);
+        }
+        self.find_contacts(&traversal.findings);
+        for contact in 0..self.contacts.len() {
+            for arm in 0..self.contacts[contact].arms.len() {
+                if !self.contacts[contact].arms[arm].used {
+                    self.trace_arm(contact, arm);
+                }
+            }
+        }
+        for seed in &traversal.findings.ridges {
+            self.trace_ridge(seed);
+        }
+        let total = (traversal.arcs.len() + traversal.findings.seeds.len()).max(1) as f64;
+        for (k, seed) in traversal.findings.seeds.iter().enumerate() {
+            if job.is_cancelled() {
+                self.cancelled();
+                return;
+            }
+            self.trace_contact_seed(seed);
+            job.progress(0.5 + 0.5 * k as f64 / total);
+        }
+        for (k, arc) in traversal.arcs.iter().enumerate() {
+            if job.is_cancelled() {
+                self.cancelled();
+                return;
+            }
+            self.trace_arc(arc);
+            job.progress(0.5 + 0.5 * (k + traversal.findings.seeds.len()) as f64 / total);
+        }
+        self.settle_undecided(&traversal.findings.undecided);
+    }
+
+    fn cancelled(&mut self) {
+        let whole = [DVec2::ZERO, DVec2::ONE];
+        let entry = self.unresolved_at([0, 0], whole, whole, "cancelled");
+        self.unresolved.push(entry);
+    }
+
+    fn unresolved_at(&self, pair: [usize; 2], a: [DVec2; 2], b: [DVec2; 2], reason: &str) -> Unresolved {
+        let (pa, pb) = (&self.sides[0].pieces[pair[0]], &self.sides[1].pieces[pair[1]]);
+        let boxed = |piece: &super::piece::Piece, rect: [DVec2; 2]| {
+            let (low, high) = (piece.to_surface(rect[0]), piece.to_surface(rect[1]));
+            [[low.x, high.x], [low.y, high.y]]
+        };
+        Unresolved {
+            a: pa.surface,
+            uv_box: boxed(pa, a),
+            b: pb.surface,
+            st_box: boxed(pb, b),
+            reason: reason.to_owned(),
+        }
+    }
+
+    fn give_up(&mut self, pair: [usize; 2], at: PointPair, reason: &str) {
+        let around = |x: DVec2| [(x - 1e-3).clamp(DVec2::ZERO, DVec2::ONE), (x + 1e-3).clamp(DVec2::ZERO, DVec2::ONE)];
+        let entry = self.unresolved_at(pair, around(at.uv), around(at.st), reason);
+        if !self.unresolved.contains(&entry) {
+            self.unresolved.push(entry);
+        }
+    }
+
+    /// Polishes critical points on the exact surfaces and finds the arms of those that are contacts.
+    fn find_contacts(&mut self, findings: &Findings) {
+        let mut found: Vec<(binormal::Binormal, [usize; 2], bool)> = Vec::new();
+        for critical in &findings.criticals {
+            let (a, b) = (&self.sides[0].pieces[critical.pa], &self.sides[1].pieces[critical.pb]);
+            let Some(point) = binormal::polish(a, b, critical.at, 0.02, false) else {
+                self.give_up([critical.pa, critical.pb], critical.at, "a point of contact could not be polished");
+                continue;
+            };
+            let slack = 1e-6;
+            let x = point.at.to_array();
+            if point.gap.abs() > self.gap || x.iter().any(|&v| !(-slack..=1.0 + slack).contains(&v)) {
+                continue;
+            }
+            let same = |other: &binormal::Binormal| other.p.distance(point.p) < 1e-6;
+            if !found.iter().any(|(other, ..)| same(other)) {
+                found.push((point, [critical.pa, critical.pb], critical.extremum));
+            }
+        }
+        let centers: Vec<DVec3> = found.iter().map(|(f, ..)| f.p).collect();
+        for (k, (point, pair, extremum)) in found.into_iter().enumerate() {
+            let others = centers.iter().enumerate().filter(|&(j, _)| j != k).map(|(_, c)| c.distance(point.p));
+            let radius = others.fold(0.02, |r: f64, d| r.min(0.3 * d));
+            let at = point.at;
+            if extremum {
+                self.contacts.push(Contacted { binormal: point, pair, radius, arms: Vec::new() });
+                continue;
+            }
+            match arms_of([&self.sides[0], &self.sides[1]], point, pair, radius, self.trace.joining) {
+                Some(contact) => self.contacts.push(contact),
+                None => self.give_up(pair, at, "the arms of a junction could not be told apart"),
+            }
+        }
+    }
+
+    /// Runs a closure with a tracer over the present discs.
+    fn with_tracer<T>(&self, f: impl FnOnce(&Tracer<'_>) -> T) -> T {
+        let discs: Vec<Disc> = self
+            .contacts
+            .iter()
+            .map(|c| Disc { center: c.binormal.p, radius: if c.arms.is_empty() { 0.0 } else { c.radius } })
+            .collect();
+        f(&Tracer { sides: [&self.sides[0], &self.sides[1]], options: self.trace, discs: &discs })
+    }
+
+    /// Traces from the outer end of an arm.
+    fn trace_arm(&mut self, contact: usize, arm: usize) {
+        self.contacts[contact].arms[arm].used = true;
+        let mut nodes = self.contacts[contact].arms[arm].nodes.clone();
+        let Some(outer) = nodes.pop() else { return };
+        let (points, end) = self.with_tracer(|tracer| {
+            let plane = Condition::Plane { point: outer.p, direction: outer.tangent };
+            let start = tracer.locate(Mode::Transversal, [outer.pa, outer.pb], outer.at, plane, outer.tangent);
+            tracer.trace(Mode::Transversal, start.unwrap_or(outer))
+        });
+        nodes.extend(points);
+        let start = ChainEnd { end: CurveEnd::Junction, contact: Some(contact) };
+        self.finish(Mode::Transversal, nodes, start, end);
+    }
+
+    /// Closes a chain whose start is known with what its trace says about its end.
+    fn finish(&mut self, mode: Mode, mut nodes: Vec<TraceNode>, start: ChainEnd, end: End) {
+        let end = self.attach(&mut nodes, end);
+        let closed = end.end == CurveEnd::Loop;
+        let ends = if closed { [end, end] } else { [start, end] };
+        self.keep(Chain { nodes, mode, ends });
+    }
+
+    /// Turns the end of a trace into the end of a chain; at a junction the arm's points are added.
+    fn attach(&mut self, nodes: &mut Vec<TraceNode>, end: End) -> ChainEnd {
+        let plain = |end| ChainEnd { end, contact: None };
+        let Some(&last) = nodes.last() else { return plain(CurveEnd::Unresolved) };
+        match end {
+            End::Boundary => plain(CurveEnd::Boundary),
+            End::Loop => plain(CurveEnd::Loop),
+            End::Unresolved(reason) => {
+                self.give_up([last.pa, last.pb], last.at, reason);
+                plain(CurveEnd::Unresolved)
+            }
+            End::Junction(contact) => {
+                let target = &mut self.contacts[contact];
+                let radius = target.radius;
+                let nearest = target
+                    .arms
+                    .iter_mut()
+                    .filter(|arm| !arm.used)
+                    .filter_map(|arm| arm.nodes.last().map(|n| n.p).map(|p| (p, arm)))
+                    .min_by(|(p, _), (q, _)| p.distance(last.p).total_cmp(&q.distance(last.p)));
+                // The last point lies outside the disc, at most a step away, and the arm continues it.
+                let continues = |p: DVec3| {
+                    let chord = p - last.p;
+                    chord.length() < 1e-6 + 0.2 * radius || chord.normalize().dot(last.tangent) > 0.8
+                };
+                match nearest {
+                    Some((p, arm)) if continues(p) => {
+                        arm.used = true;
+                        let inward = arm.nodes.iter().rev().map(|n| n.reversed());
+                        nodes.extend(inward.filter(|n| n.p.distance(last.p) > 1e-12));
+                        ChainEnd { end: CurveEnd::Junction, contact: Some(contact) }
+                    }
+                    _ => {
+                        self.give_up([last.pa, last.pb], last.at, "a curve meets a junction where no arm is left");
+                        plain(CurveEnd::Unresolved)
+                    }
+                }
+            }
+        }
+    }
+
+    fn keep(&mut self, chain: Chain) {
+        let index = self.chains.len();
+        for (k, pair) in chain.nodes.windows(2).enumerate() {
+            if pair[0].same_pair(&pair[1]) {
+                self.register.entry((pair[0].pa, pair[0].pb)).or_default().push((index, k));
+                if on_border(&pair[0]) || on_border(&pair[1]) {
+                    self.border_segments.push((index, k));
+                }
+            }
+        }
+        self.chains.push(chain);
+    }
+
+    /// Whether a point lies on a curve that was traced, or in the disc of a junction.
+    fn known(&self, node: &TraceNode, mode: Mode) -> bool {
+        if self.contacts.iter().any(|c| c.binormal.p.distance(node.p) < if c.arms.is_empty() { 1e-7 } else { c.radius })
+        {
+            return true;
+        }
+        self.with_tracer(|tracer| {
+            let on = |&(chain, k): &(usize, usize), least: f64| {
+                let chain = &self.chains[chain];
+                let (from, to) = (&chain.nodes[k], &chain.nodes[k + 1]);
+                chain.mode == mode && tracer.passes(from, to, node, least)
+            };
+            let register = self.register.get(&(node.pa, node.pb));
+            register.is_some_and(|segments| segments.iter().any(|s| on(s, 0.0)))
+                // On a border the curve may run through other pieces than this seed's.
+                || (on_border(node) && self.border_segments.iter().any(|s| on(s, SAME_ON_BORDER)))
+        })
+    }
+
+    /// Traces both ways from a point that lies on no curve yet.
+    fn trace_both(&mut self, mode: Mode, node: TraceNode) {
+        if self.known(&node, mode) {
+            return;
+        }
+        let (forward, end) = self.with_tracer(|tracer| tracer.trace(mode, node));
+        if end == End::Loop {
+            let start = ChainEnd { end: CurveEnd::Loop, contact: None };
+            self.finish(mode, forward, start, end);
+            return;
+        }
+        let (mut backward, start) = self.with_tracer(|tracer| tracer.trace(mode, node.reversed()));
+        let start = self.attach(&mut backward, start);
+        let mut nodes: Vec<TraceNode> = backward.into_iter().rev().map(TraceNode::reversed).collect();
+        if nodes.last().zip(forward.first()).is_some_and(|(x, y)| x.same_pair(y) && x.p == y.p) {
+            nodes.pop();
+        }
+        nodes.extend(forward);
+        self.finish(mode, nodes, start, end);
+    }
+
+    fn inside(node: &TraceNode) -> bool {
+        node.at.to_array().iter().all(|v| (-SLACK..=1.0 + SLACK).contains(v))
+    }
+
+    fn trace_contact_seed(&mut self, seed: &Seed) {
+        let pair = [seed.pa, seed.pb];
+        let ja = self.sides[0].pieces[seed.pa].jet1(seed.at.uv);
+        let jb = self.sides[1].pieces[seed.pb].jet1(seed.at.st);
+        let along = ja.cross().normalize_or_zero().cross(jb.cross().normalize_or_zero()).normalize_or_zero();
+        let found = self.with_tracer(|tracer| {
+            let plane = Condition::Plane { point: ja.p, direction: along };
+            let across = (0..4).map(|k| Condition::Fixed(k, seed.at.to_array()[k]));
+            std::iter::once(plane)
+                .chain(across)
+                .filter_map(|c| tracer.locate(Mode::Transversal, pair, seed.at, c, along))
+                .find(|n| n.p.distance(ja.p) < 1e-3)
+        });
+        match found {
+            Some(node) if Self::inside(&node) => self.trace_both(Mode::Transversal, node),
+            Some(_) => {}
+            None => {
+                let near = |c: &Contacted| c.binormal.p.distance(ja.p) < c.radius.max(1e-6);
+                if !self.contacts.iter().any(near) {
+                    self.give_up(pair, seed.at, "a point of a curve could not be corrected");
+                }
+            }
+        }
+    }
+
+    fn trace_ridge(&mut self, seed: &Seed) {
+        let found = self.with_tracer(|tracer| {
+            let none = Condition::Fixed(0, 0.0); // the floor of a valley needs no further condition
+            tracer.locate(Mode::Tangential, [seed.pa, seed.pb], seed.at, none, DVec3::X)
+        });
+        match found {
+            Some(node) if Self::inside(&node) => self.trace_both(Mode::Tangential, node),
+            Some(_) => {}
+            None => self.give_up([seed.pa, seed.pb], seed.at, "a point of contact could not be polished"),
+        }
+    }
+
+    /// Makes sure that the arc of a pair of nodes belongs to a curve.
+    fn trace_arc(&mut self, arc: &ArcPair) {
+        let (a, b) = (&self.trees[0].nodes[arc.a], &self.trees[1].nodes[arc.b]);
+        let pair = [a.piece, b.piece];
+        let visited = self.register.get(&(pair[0], pair[1])).is_some_and(|segments| {
+            segments.iter().any(|&(chain, k)| {
+                let at = self.chains[chain].nodes[k].at;
+                at.uv.cmpge(a.low).all()
+                    && at.uv.cmple(a.high).all()
+                    && at.st.cmpge(b.low).all()
+                    && at.st.cmple(b.high).all()
+            })
+        });
+        if visited {
+            return;
+        }
+        let local = |w: f64| {
+            let x: [f64; 4] = std::array::from_fn(|k| arc.x0[k] + arc.tau[k] * w);
+            PointPair { uv: a.local(DVec2::new(x[0], x[1])), st: b.local(DVec2::new(x[2], x[3])) }
+        };
+        let direction = (a.au * arc.tau[0] + a.av * arc.tau[1]).normalize_or_zero();
+        let middle = 0.5 * (arc.range[0] + arc.range[1]);
+        let low = [a.low.x, a.low.y, b.low.x, b.low.y];
+        let high = [a.high.x, a.high.y, b.high.x, b.high.y];
+        let seeds: Vec<TraceNode> = self.with_tracer(|tracer| {
+            let at = local(middle);
+            let point = self.sides[0].pieces[pair[0]].point(at.uv);
+            let plane = Condition::Plane { point, direction };
+            let first = tracer.locate(Mode::Transversal, pair, at, plane, direction).filter(Self::inside);
+            if let Some(node) = first {
+                return vec![node];
+            }
+            // The arc may enter the domain near a border only: look for it on every border of the pieces.
+            let mut out = Vec::new();
+            for k in 0..4 {
+                for bound in [0.0, 1.0] {
+                    if (bound == 0.0 && low[k] > 0.0) || (bound == 1.0 && high[k] < 1.0) || arc.tau[k].abs() < 1e-9 {
+                        continue;
+                    }
+                    let x = if bound == 0.0 { -1.0 } else { 1.0 };
+                    let w = ((x - arc.x0[k]) / arc.tau[k]).clamp(arc.range[0], arc.range[1]);
+                    let node = tracer.locate(Mode::Transversal, pair, local(w), Condition::Fixed(k, bound), direction);
+                    out.extend(node.filter(Self::inside));
+                }
+            }
+            out
+        });
+        for seed in seeds {
+            self.trace_both(Mode::Transversal, seed);
+        }
+    }
+
+    /// Cells that no gap function decided, unless a junction explains them.
+    fn settle_undecided(&mut self, cells: &[Cell]) {
+        for cell in cells {
+            let p = self.sides[0].pieces[cell.pa].point(cell.middle.uv);
+            let explained = self.contacts.iter().any(|c| c.binormal.p.distance(p) < c.radius);
+            if !explained {
+                let around = [cell.middle.st - 1e-4, cell.middle.st + 1e-4];
+                let entry = self.unresolved_at(
+                    [cell.pa, cell.pb],
+                    [cell.low, cell.high],
+                    around,
+                    "the contact is of higher order than can be told",
+                );
+                if self.unresolved.len() < 1000 {
+                    self.unresolved.push(entry);
+                }
+            }
+        }
+    }
+}

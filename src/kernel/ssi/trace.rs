@@ -1,0 +1,553 @@
+//! Following a curve from piece to piece.
+//!
+//! A step is predicted along the tangent, corrected on the exact surfaces, and accepted when the cubic Hermite
+//! interpolant between its ends, compared with a corrected point in the middle, is within the wanted error. That
+//! measures what matters: turning angles alone lose branches that run close together. The sense of the curve is the
+//! sense of N_A x N_B, which cannot flip on a transversal curve, so that jumping onto a neighbouring branch of
+//! opposite sense is impossible and onto others is caught by the error. At the border of a piece the curve is
+//! corrected onto the border and goes on in the piece beyond, of the same surface or of a neighbour.
+//!
+//! Cost: about three corrections a step, two kept as points. It fails honestly: [`End::Unresolved`] names the place.
+
+use glam::{DVec2, DVec3};
+
+use super::binormal;
+use super::contact::SLACK;
+use super::correct::{Condition, PointPair, correct};
+use super::piece::{Jet1, Patch};
+use super::side::{Place, Side};
+
+/// A traced point.
+#[derive(Clone, Copy, Debug)]
+pub struct TraceNode {
+    /// The piece of A.
+    pub pa: usize,
+    /// The piece of B.
+    pub pb: usize,
+    /// The parameters.
+    pub at: PointPair,
+    /// The point midway between the surfaces.
+    pub p: DVec3,
+    /// The unit tangent in the sense of the travel.
+    pub tangent: DVec3,
+    /// How fast the four parameters change with arc length.
+    pub rates: [f64; 4],
+    /// The sine of the angle between the surfaces, at least [`LEAST_SINE`].
+    pub sine: f64,
+}
+
+/// The smallest sine of an angle that is told from 0.
+pub const LEAST_SINE: f64 = 1e-11;
+
+/// Why a trace ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum End {
+    /// At the border of a side.
+    Boundary,
+    /// At its own start.
+    Loop,
+    /// In the disc of a junction.
+    Junction(usize),
+    /// For the named reason.
+    Unresolved(&'static str),
+}
+
+/// What kind of curve is followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// The surfaces cross.
+    Transversal,
+    /// The surfaces touch along the curve.
+    Tangential,
+}
+
+/// A curve that changes a parameter less than this while another one changes by 1 runs along its border.
+const SHALLOW: f64 = 1e-5;
+
+/// A disc around a junction in which its own arms take over.
+#[derive(Clone, Copy, Debug)]
+pub struct Disc {
+    /// The middle.
+    pub center: DVec3,
+    /// The radius.
+    pub radius: f64,
+}
+
+/// The settings of a trace, in the unit frame.
+#[derive(Clone, Copy, Debug)]
+pub struct TraceOptions {
+    /// The largest error of the Hermite interpolant between points.
+    pub tol: f64,
+    /// The distance of surface points below which rounding reigns.
+    pub floor: f64,
+    /// How far apart the borders of neighbouring pieces may be.
+    pub joining: f64,
+    /// The largest number of points of one curve.
+    pub most_points: usize,
+}
+
+/// What a tracer needs.
+pub struct Tracer<'a> {
+    /// Both sides.
+    pub sides: [&'a Side; 2],
+    /// The settings.
+    pub options: TraceOptions,
+    /// The discs at which it stops.
+    pub discs: &'a [Disc],
+}
+
+impl TraceNode {
+    /// The same point travelled the other way.
+    #[must_use]
+    pub fn reversed(self) -> Self {
+        Self { tangent: -self.tangent, rates: self.rates.map(|r| -r), ..self }
+    }
+
+    /// The same curve point seen with the sides exchanged.
+    pub fn same_pair(&self, other: &Self) -> bool {
+        self.pa == other.pa && self.pb == other.pb
+    }
+}
+
+/// The parameters at a fraction between two points of the same pair of pieces.
+pub fn hermite(a: &TraceNode, b: &TraceNode, f: f64) -> PointPair {
+    let h = a.p.distance(b.p);
+    let (x, y) = (a.at.to_array(), b.at.to_array());
+    let g = 1.0 - f;
+    let weights = [g * g * (1.0 + 2.0 * f), f * f * (3.0 - 2.0 * f), g * g * f * h, -f * f * g * h];
+    let mut out = [0.0; 4];
+    for (k, out) in out.iter_mut().enumerate() {
+        *out = weights[0] * x[k] + weights[1] * y[k] + weights[2] * a.rates[k] + weights[3] * b.rates[k];
+    }
+    PointPair::from_array(out)
+}
+
+fn rates_of(u: DVec3, v: DVec3, t: DVec3) -> Option<DVec2> {
+    let (e, f, g) = (u.length_squared(), u.dot(v), v.length_squared());
+    let det = e * g - f * f;
+    if !(det > 1e-20 * e * g) {
+        return None;
+    }
+    let (a, b) = (u.dot(t), v.dot(t));
+    Some(DVec2::new((g * a - f * b) / det, (e * b - f * a) / det))
+}
+
+/// How fast the four parameters change along a unit tangent.
+pub fn rates(a: &Jet1, b: &Jet1, tangent: DVec3) -> Option<[f64; 4]> {
+    let (ra, rb) = (rates_of(a.u, a.v, tangent)?, rates_of(b.u, b.v, tangent)?);
+    Some([ra.x, ra.y, rb.x, rb.y])
+}
+
+impl Tracer<'_> {
+    /// The curve point near `start` under a condition, with the tangent on the side of `along`.
+    pub fn locate(
+        &self,
+        mode: Mode,
+        pair: [usize; 2],
+        start: PointPair,
+        condition: Condition,
+        along: DVec3,
+    ) -> Option<TraceNode> {
+        let (a, b) = (&self.sides[0].pieces[pair[0]], &self.sides[1].pieces[pair[1]]);
+        let (at, p, tangent, ja, jb, sine) = match mode {
+            Mode::Transversal => {
+                let hit = correct(a, b, start, condition, self.options.floor)?;
+                if hit.residual > 1e-9 {
+                    return None;
+                }
+                let [na, nb] = hit.normals();
+                let t = na.cross(nb);
+                let sine = t.length();
+                if sine < LEAST_SINE {
+                    return None;
+                }
+                let t = t / sine;
+                // Rounding of the normals tilts the cross product out of the surfaces.
+                let t = (t - na * t.dot(na)).normalize();
+                (hit.at, hit.point(), t, hit.a, hit.b, sine)
+            }
+            Mode::Tangential => {
+                let found = binormal::polish(a, b, start, 0.05, true)?;
+                let (_, e, _) = found.principal();
+                let t = found.in_space(e.perp());
+                (found.at, found.p, t, a.jet1(found.at.uv), b.jet1(found.at.st), 1.0)
+            }
+        };
+        let tangent = if tangent.dot(along) < 0.0 { -tangent } else { tangent };
+        let rates = rates(&ja, &jb, tangent)?;
+        let node = TraceNode { pa: pair[0], pb: pair[1], at, p, tangent, rates, sine };
+        // A border along the curve does not fix a point of it.
+        if let Condition::Fixed(k, _) = condition
+            && mode == Mode::Transversal
+            && rates[k].abs() * self.reach(&node) < SHALLOW
+        {
+            return None;
+        }
+        Some(node)
+    }
+
+    /// The sense of a curve point: the sign of its tangent against N_A x N_B.
+    fn sense(&self, node: &TraceNode) -> f64 {
+        let ja = self.sides[0].pieces[node.pa].jet1(node.at.uv);
+        let jb = self.sides[1].pieces[node.pb].jet1(node.at.st);
+        ja.cross().cross(jb.cross()).dot(node.tangent).signum()
+    }
+
+    /// Follows the curve from `start` in the sense of its tangent. The points include `start`; a closed curve ends
+    /// with a copy of it.
+    pub fn trace(&self, mode: Mode, start: TraceNode) -> (Vec<TraceNode>, End) {
+        let mut out = vec![start];
+        let mut start = start;
+        let mut current = start;
+        let mut h = 0.05 * self.reach(&current);
+        let mut hops = 0;
+        let mut travelled = 0.0;
+        loop {
+            if out.len() > self.options.most_points {
+                return (out, End::Unresolved("the curve has more points than allowed"));
+            }
+            if let Some(k) = self.leaves(&current) {
+                hops += 1;
+                if hops > 12 {
+                    return (out, End::Unresolved("the curve runs to and fro across a border"));
+                }
+                match self.cross(mode, &current, k) {
+                    Some(next) => {
+                        if travelled > 1e-7 && next.same_pair(&start) && self.meets(&next, &start) {
+                            out.push(next);
+                            out.push(start);
+                            return (out, End::Loop);
+                        }
+                        if travelled == 0.0 {
+                            // Nothing was travelled in the first pair.
+                            out.clear();
+                            start = next;
+                        }
+                        current = next;
+                        out.push(next);
+                        continue;
+                    }
+                    None => return (out, End::Boundary),
+                }
+            }
+            // A step, shortened until it is good.
+            let sense = if mode == Mode::Transversal { self.sense(&current) } else { 0.0 };
+            h = h.min(0.3 * self.reach(&current));
+            let (middle, next) = loop {
+                if h < 1e-11 {
+                    return (out, End::Unresolved("the curve cannot be followed"));
+                }
+                match self.step(mode, &current, h, sense) {
+                    Ok((middle, next, error)) => {
+                        let factor = (0.5 * self.options.tol / error.max(1e-30)).powf(0.25) * 0.9;
+                        let used = h;
+                        h *= factor.clamp(0.3, 2.0);
+                        if error <= self.options.tol {
+                            break (middle, next);
+                        }
+                        h = h.min(0.7 * used);
+                    }
+                    Err(()) => h *= 0.4,
+                }
+            };
+            let exit = self.exit(mode, &current, &next);
+            let (ends, leaving) = match exit {
+                Ok(None) => (vec![middle, next], false),
+                Ok(Some(node)) => (vec![node], true),
+                Err(()) => {
+                    // Along a border: change over to the piece beyond where it is.
+                    if let Some(k) = self.drifts(&current, &next)
+                        && let Some(beyond) = self.cross(mode, &current, k)
+                        && hops < 12
+                    {
+                        hops += 1;
+                        current = beyond;
+                        out.push(beyond);
+                        continue;
+                    }
+                    // The border is met at a shallow angle: come closer first.
+                    h = 0.3 * current.p.distance(next.p);
+                    if h < 1e-9 {
+                        return (out, End::Unresolved("the border of a patch is met at too shallow an angle"));
+                    }
+                    continue;
+                }
+            };
+            for node in ends {
+                if let Some(disc) = self.enters(&current, &node, travelled) {
+                    return (out, End::Junction(disc));
+                }
+                if travelled > 0.0 && self.returns(&current, &node, &start) {
+                    out.push(start);
+                    return (out, End::Loop);
+                }
+                travelled += current.p.distance(node.p);
+                current = node;
+                out.push(node);
+            }
+            if !leaving {
+                hops = 0;
+            } else if travelled > 1e-7 && current.same_pair(&start) && self.meets(&current, &start) {
+                out.push(start);
+                return (out, End::Loop);
+            }
+        }
+    }
+
+    fn returns(&self, from: &TraceNode, to: &TraceNode, start: &TraceNode) -> bool {
+        from.same_pair(start)
+            && to.same_pair(start)
+            && start.tangent.dot(to.p - from.p) > 0.0
+            && self.passes(from, to, start, 0.0)
+    }
+
+    fn meets(&self, a: &TraceNode, b: &TraceNode) -> bool {
+        a.p.distance(b.p) < 1e-8 && a.tangent.dot(b.tangent) > 0.7
+    }
+
+    /// The arc length after which a parameter has changed by about 1.
+    fn reach(&self, node: &TraceNode) -> f64 {
+        1.0 / node.rates.iter().fold(1e-3, |m: f64, r| m.max(r.abs()))
+    }
+
+    fn step(&self, mode: Mode, from: &TraceNode, h: f64, sense: f64) -> Result<(TraceNode, TraceNode, f64), ()> {
+        let pair = [from.pa, from.pb];
+        let x = from.at.to_array();
+        let guess = PointPair::from_array(std::array::from_fn(|k| x[k] + h * from.rates[k]));
+        let plane = Condition::Plane { point: from.p + from.tangent * h, direction: from.tangent };
+        let next = self.locate(mode, pair, guess, plane, from.tangent).ok_or(())?;
+        let chord = next.p - from.p;
+        let length = chord.length();
+        if next.tangent.dot(from.tangent) < 0.6
+            || chord.dot(from.tangent) < 0.8 * length
+            || length > 2.0 * h
+            || length < 0.3 * h
+        {
+            return Err(());
+        }
+        if mode == Mode::Transversal && self.sense(&next) != sense {
+            return Err(());
+        }
+        let guess = hermite(from, &next, 0.5);
+        let plane = Condition::Plane { point: 0.5 * (from.p + next.p), direction: chord / length };
+        let middle = self.locate(mode, pair, guess, plane, from.tangent).ok_or(())?;
+        if mode == Mode::Transversal && self.sense(&middle) != sense {
+            return Err(());
+        }
+        let (a, b) = (&self.sides[0].pieces[pair[0]], &self.sides[1].pieces[pair[1]]);
+        let off = |p: DVec3| {
+            let d = p - middle.p;
+            (d - middle.tangent * d.dot(middle.tangent)).length()
+        };
+        let error = off(a.point(guess.uv)).max(off(b.point(guess.st)));
+        Ok((middle, next, error))
+    }
+
+    /// Which parameter stands on its border and is about to leave.
+    fn leaves(&self, node: &TraceNode) -> Option<usize> {
+        let x = node.at.to_array();
+        let reach = self.reach(node);
+        (0..4).find(|&k| {
+            let outward = if x[k] >= 1.0 - 1e-12 {
+                node.rates[k]
+            } else if x[k] <= 1e-12 {
+                -node.rates[k]
+            } else {
+                return false;
+            };
+            outward * 0.1 * reach > SLACK
+        })
+    }
+
+    /// Where the step leaves the pair of pieces, if it does.
+    fn exit(&self, mode: Mode, from: &TraceNode, to: &TraceNode) -> Result<Option<TraceNode>, ()> {
+        let (x0, x1) = (from.at.to_array(), to.at.to_array());
+        let mut first: Option<(f64, usize, f64)> = None;
+        for k in 0..4 {
+            let bound = if x1[k] > 1.0 + SLACK {
+                1.0
+            } else if x1[k] < -SLACK {
+                0.0
+            } else {
+                continue;
+            };
+            let f = if x1[k] == x0[k] { 0.0 } else { ((bound - x0[k]) / (x1[k] - x0[k])).clamp(0.0, 1.0) };
+            if first.is_none_or(|(g, ..)| f < g) {
+                first = Some((f, k, bound));
+            }
+        }
+        let Some(mut candidate) = first else { return Ok(None) };
+        for _ in 0..4 {
+            let (f, k, bound) = candidate;
+            let node = self.on_border(mode, from, to, f, k, bound).ok_or(())?;
+            let x = node.at.to_array();
+            let worst = (0..4)
+                .filter(|&j| j != k)
+                .map(|j| (j, (x[j] - 1.0).max(-x[j])))
+                .max_by(|a, b| a.1.total_cmp(&b.1))
+                .ok_or(())?;
+            if worst.1 <= SLACK {
+                let ahead = (node.p - from.p).dot(from.tangent);
+                let length = node.p.distance(from.p);
+                if ahead < -1e-12 || length > 1.2 * to.p.distance(from.p) + 1e-12 {
+                    return Err(());
+                }
+                return Ok(Some(node));
+            }
+            let j = worst.0;
+            let bound = if x[j] > 1.0 { 1.0 } else { 0.0 };
+            candidate = (((bound - x0[j]) / (x1[j] - x0[j])).clamp(0.0, 1.0), j, bound);
+        }
+        Err(())
+    }
+
+    /// Which parameter leaves by drifting slowly along its border.
+    fn drifts(&self, from: &TraceNode, to: &TraceNode) -> Option<usize> {
+        let (x, y) = (from.at.to_array(), to.at.to_array());
+        let reach = self.reach(from);
+        (0..4).find(|&k| {
+            let out = y[k] > 1.0 + SLACK || y[k] < -SLACK;
+            let near = x[k] < 10.0 * SLACK || x[k] > 1.0 - 10.0 * SLACK;
+            out && near && from.rates[k].abs() * reach < 10.0 * SHALLOW
+        })
+    }
+
+    fn on_border(
+        &self,
+        mode: Mode,
+        from: &TraceNode,
+        to: &TraceNode,
+        f: f64,
+        k: usize,
+        bound: f64,
+    ) -> Option<TraceNode> {
+        let pair = [from.pa, from.pb];
+        if mode == Mode::Transversal {
+            // The fraction at which the Hermite interpolant meets the border.
+            let mut f = f;
+            for _ in 0..4 {
+                let e = 1e-4;
+                let value = hermite(from, to, f).to_array()[k];
+                let slope = (hermite(from, to, f + e).to_array()[k] - value) / e;
+                if slope.abs() < 1e-9 {
+                    break;
+                }
+                f = (f + (bound - value) / slope).clamp(0.0, 1.0);
+            }
+            return self.locate(mode, pair, hermite(from, to, f), Condition::Fixed(k, bound), from.tangent);
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        let rising = to.at.to_array()[k] > from.at.to_array()[k];
+        let mut best = None;
+        for _ in 0..40 {
+            let f = 0.5 * (low + high);
+            let node = self.locate(mode, pair, hermite(from, to, f), Condition::Fixed(k, bound), from.tangent)?;
+            if (node.at.to_array()[k] < bound) == rising {
+                low = f
+            } else {
+                high = f
+            }
+            best = Some(node);
+            if (node.at.to_array()[k] - bound).abs() < 1e-13 {
+                break;
+            }
+        }
+        best
+    }
+
+    /// The same point on the piece beyond the border of parameter `k`.
+    fn cross(&self, mode: Mode, node: &TraceNode, k: usize) -> Option<TraceNode> {
+        let side = k / 2;
+        let (piece, uv) = if side == 0 { (node.pa, node.at.uv) } else { (node.pb, node.at.st) };
+        let places = self.sides[side].across(Place { piece, uv }, k % 2, node.p, self.options.joining);
+        let mut best: Option<(f64, TraceNode)> = None;
+        for (place, border) in places {
+            let (pair, start) = if side == 0 {
+                ([place.piece, node.pb], PointPair { uv: place.uv, st: node.at.st })
+            } else {
+                ([node.pa, place.piece], PointPair { uv: node.at.uv, st: place.uv })
+            };
+            let free = if side == 0 { [0, 1] } else { [2, 3] };
+            let x = start.to_array();
+            let fixed = free[border];
+            let plane = Condition::Plane { point: node.p, direction: node.tangent };
+            // On the new border exactly where that is well conditioned, else across the curve.
+            let on_border = self.locate(mode, pair, start, Condition::Fixed(fixed, x[fixed]), node.tangent);
+            let close = |n: &TraceNode| n.p.distance(node.p) < 4.0 * self.options.joining + 1e-9;
+            let found = on_border
+                .filter(|n| mode == Mode::Transversal && close(n))
+                .or_else(|| self.locate(mode, pair, start, plane, node.tangent).filter(close));
+            let Some(mut next) = found else { continue };
+            if next.at.to_array().iter().any(|&v| !(-1e-5..=1.0 + 1e-5).contains(&v)) {
+                continue;
+            }
+            // It must go inwards; beyond a sharp edge that tells its sense better than the old tangent does.
+            let x = next.at.to_array();
+            let sign = if x[fixed] > 0.5 { -1.0 } else { 1.0 };
+            let inward = |n: &TraceNode| sign * n.rates[fixed] * self.reach(n);
+            if inward(&next) < -1e-3 {
+                next = next.reversed();
+            }
+            // A curve that would run straight back has met the end of the next piece, not its beginning.
+            if next.tangent.dot(node.tangent) < -0.95 {
+                continue;
+            }
+            let out = free
+                .into_iter()
+                .map(|j| {
+                    if x[j] < 1e-6 {
+                        -next.rates[j]
+                    } else if x[j] > 1.0 - 1e-6 {
+                        next.rates[j]
+                    } else {
+                        0.0
+                    }
+                })
+                .fold(0.0, f64::max)
+                * self.reach(&next);
+            if best.as_ref().is_none_or(|(o, _)| out < *o) {
+                best = Some((out, next));
+            }
+        }
+        best.map(|(_, node)| node)
+    }
+
+    fn enters(&self, from: &TraceNode, to: &TraceNode, travelled: f64) -> Option<usize> {
+        let chord = to.p - from.p;
+        let length = chord.length_squared();
+        self.discs.iter().position(|disc| {
+            let f = if length > 0.0 { ((disc.center - from.p).dot(chord) / length).clamp(0.0, 1.0) } else { 0.0 };
+            let distance = (from.p + chord * f).distance(disc.center);
+            let outward = travelled == 0.0 && f == 0.0;
+            distance < 0.98 * disc.radius && !outward
+        })
+    }
+
+    /// Whether the arc between two points passes `target`, in either sense. With a positive `least` only the points
+    /// in space are compared, within that distance, else those on both surfaces too.
+    pub fn passes(&self, from: &TraceNode, to: &TraceNode, target: &TraceNode, least: f64) -> bool {
+        let chord = to.p - from.p;
+        let length = chord.length();
+        if from.p.distance(target.p) > 1.5 * length + 1e-8 {
+            return false;
+        }
+        if from.p.distance(target.p) < 1e-9 || to.p.distance(target.p) < 1e-9 {
+            return true;
+        }
+        let a = &self.sides[0].pieces[from.pa];
+        let b = &self.sides[1].pieces[from.pb];
+        let mut f = (target.p - from.p).dot(chord) / (length * length);
+        for _ in 0..4 {
+            let p = a.point(hermite(from, to, f.clamp(-0.1, 1.1)).uv);
+            f += (target.p - p).dot(chord) / (length * length);
+        }
+        if !(-0.01..=1.01).contains(&f) || target.tangent.dot(chord).abs() < 0.3 * length {
+            return false;
+        }
+        let at = hermite(from, to, f);
+        // Near tangency a corrected point is only good to rounding over the sine of the angle.
+        let slack = (1e-3 * length + 1e-9 + 2.0 * self.options.floor / target.sine).max(least);
+        let slack = if least > 0.0 { least + 2.0 * self.options.floor / target.sine } else { slack };
+        a.point(at.uv).distance(target.p) < slack && b.point(at.st).distance(target.p) < slack
+    }
+}

@@ -1,0 +1,345 @@
+//! Lazily subdivided nodes over the pieces, and what a pair of nodes can prove.
+//!
+//! A node is its affine part c + au x + av y over [-1, 1]^2 and bounds of the remainder and of its derivatives,
+//! split into normal and tangential components: 300-500 bytes of working data. For a pair the linear system
+//! A - B = 0 is solved for the tube that contains every solution:
+//!
+//! ```text
+//! x = tau w + x0 - K R(x),   K the pseudo-inverse of J = [au av -bu -bv],  |K R| bounded per coordinate
+//! ```
+//!
+//! When the tube misses the box the pair is empty. When K times the derivative of R is a contraction, every
+//! solution is unique for its w: one arc, no loop, no singular point (an interval Newton argument, which replaces
+//! the thesis's "Gauss maps disjoint, so at most one branch"; that is false). Rational pieces are bounded by
+//! interpolating polynomials whose measured error, with a safety factor, pads all bounds.
+
+use glam::{DVec2, DVec3};
+
+use super::piece::Piece;
+use super::side::Side;
+use crate::kernel::geom::Aabb;
+
+/// A node over a rectangle of a piece's local domain.
+#[derive(Clone, Debug)]
+pub struct Node {
+    /// Which piece.
+    pub piece: usize,
+    /// Where the rectangle starts.
+    pub low: DVec2,
+    /// Where it ends.
+    pub high: DVec2,
+    /// The node that this is half of.
+    pub parent: Option<usize>,
+    /// A box around it.
+    pub bounds: Aabb,
+    /// The middle of the affine part.
+    pub c: DVec3,
+    /// The slope of the affine part by x in [-1, 1].
+    pub au: DVec3,
+    /// The slope of the affine part by y in [-1, 1].
+    pub av: DVec3,
+    /// The unit normal of the affine part, zero where degenerate.
+    pub n: DVec3,
+    /// How far the normal may turn, roughly, in radians (infinite where degenerate).
+    pub tilt: f64,
+    /// Bounds of the remainder: normal, tangential.
+    r: [f64; 2],
+    /// Bounds of its derivatives by x: normal, tangential.
+    dx: [f64; 2],
+    /// Bounds of its derivatives by y: normal, tangential.
+    dy: [f64; 2],
+    degree: [usize; 2],
+    net: Vec<DVec3>,
+    pad: f64,
+    children: Option<[usize; 2]>,
+}
+
+impl Node {
+    fn new(
+        piece: usize,
+        rect: [DVec2; 2],
+        parent: Option<usize>,
+        degree: [usize; 2],
+        net: Vec<DVec3>,
+        pad: f64,
+    ) -> Self {
+        let [p, q] = degree;
+        let width = p + 1;
+        let at = |i: usize, j: usize| net[j * width + i];
+        let c = net.iter().copied().sum::<DVec3>() / net.len() as f64;
+        let au = (0..=q).map(|j| at(p, j) - at(0, j)).sum::<DVec3>() * (0.5 / (q + 1) as f64);
+        let av = (0..=p).map(|i| at(i, q) - at(i, 0)).sum::<DVec3>() * (0.5 / (p + 1) as f64);
+        let cross = au.cross(av);
+        let (lu, lv, area) = (au.length(), av.length(), cross.length());
+        let flat = area > 1e-9 * lu * lv && area > 0.0;
+        let n = if flat { cross / area } else { DVec3::ZERO };
+        let parts = |v: DVec3, bound: &mut [f64; 2]| {
+            let h = v.dot(n);
+            bound[0] = bound[0].max(h.abs());
+            bound[1] = bound[1].max((v - n * h).length());
+        };
+        let (mut r, mut dx, mut dy) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        for j in 0..=q {
+            for i in 0..=p {
+                let (x, y) = (2.0 * i as f64 / p as f64 - 1.0, 2.0 * j as f64 / q as f64 - 1.0);
+                parts(at(i, j) - c - au * x - av * y, &mut r);
+                if i < p {
+                    parts((at(i + 1, j) - at(i, j)) * (0.5 * p as f64) - au, &mut dx);
+                }
+                if j < q {
+                    parts((at(i, j + 1) - at(i, j)) * (0.5 * q as f64) - av, &mut dy);
+                }
+            }
+        }
+        for k in 0..2 {
+            r[k] += pad;
+            dx[k] += pad * (p * p) as f64;
+            dy[k] += pad * (q * q) as f64;
+        }
+        let tilt = if flat {
+            let turn = (dx[0] * lv + dy[0] * lu) / area;
+            let stretch = (dx[1] * lv + dy[1] * lu) / area;
+            if stretch < 0.8 { turn / (1.0 - stretch) } else { f64::INFINITY }
+        } else {
+            f64::INFINITY
+        };
+        let bounds = Aabb::of(net.iter().copied()).grown(pad);
+        Self {
+            piece,
+            low: rect[0],
+            high: rect[1],
+            parent,
+            bounds,
+            c,
+            au,
+            av,
+            n,
+            tilt,
+            r,
+            dx,
+            dy,
+            degree,
+            net,
+            pad,
+            children: None,
+        }
+    }
+
+    /// The local parameters of (x, y) in [-1, 1]^2.
+    pub fn local(&self, xy: DVec2) -> DVec2 {
+        0.5 * (self.low + self.high) + 0.5 * (self.high - self.low) * xy
+    }
+
+    /// A length that says how large the node is.
+    pub fn size(&self) -> f64 {
+        self.au.length() + self.av.length() + self.r[0] + self.r[1]
+    }
+
+    /// A bound of |k . remainder|.
+    fn reach(&self, k: DVec3, bound: [f64; 2]) -> f64 {
+        let h = k.dot(self.n);
+        h.abs() * bound[0] + (k - self.n * h).length() * bound[1]
+    }
+}
+
+/// All nodes of one side that were built so far.
+#[derive(Clone, Debug, Default)]
+pub struct Tree {
+    /// The nodes.
+    pub nodes: Vec<Node>,
+    /// Those that have no parent.
+    pub roots: Vec<usize>,
+}
+
+impl Tree {
+    /// The roots over every piece: one for a polynomial piece, a few for a rational one.
+    pub fn new(side: &Side) -> Self {
+        let mut tree = Self::default();
+        for (k, piece) in side.pieces.iter().enumerate() {
+            if !piece.rational {
+                let net = piece.points.iter().map(|p| p.truncate()).collect();
+                tree.root(Node::new(k, [DVec2::ZERO, DVec2::ONE], None, piece.degree, net, 0.0));
+                continue;
+            }
+            let mut stack = vec![([DVec2::ZERO, DVec2::ONE], 0)];
+            while let Some((rect, depth)) = stack.pop() {
+                let (degree, net, error) = interpolated(piece, rect);
+                let size = Aabb::of(net.iter().copied()).diagonal();
+                if error <= 1e-6 * size || depth >= 8 {
+                    tree.root(Node::new(k, rect, None, degree, net, 4.0 * error));
+                    continue;
+                }
+                let middle = 0.5 * (rect[0] + rect[1]);
+                if depth % 2 == 0 {
+                    stack.push(([DVec2::new(middle.x, rect[0].y), rect[1]], depth + 1));
+                    stack.push(([rect[0], DVec2::new(middle.x, rect[1].y)], depth + 1));
+                } else {
+                    stack.push(([DVec2::new(rect[0].x, middle.y), rect[1]], depth + 1));
+                    stack.push(([rect[0], DVec2::new(rect[1].x, middle.y)], depth + 1));
+                }
+            }
+        }
+        tree
+    }
+
+    fn root(&mut self, node: Node) {
+        self.roots.push(self.nodes.len());
+        self.nodes.push(node);
+    }
+
+    /// The two halves of a node, built on first use.
+    pub fn children(&mut self, index: usize) -> [usize; 2] {
+        if let Some(children) = self.nodes[index].children {
+            return children;
+        }
+        let node = &self.nodes[index];
+        let [p, q] = node.degree;
+        // Along the direction in which it is longer or bends more.
+        let score = |a: DVec3, d: [f64; 2]| a.length() + 4.0 * (d[0] + d[1]);
+        let along = if score(node.au, node.dx) >= score(node.av, node.dy) { 0 } else { 1 };
+        let (mut first, mut second) = (node.net.clone(), node.net.clone());
+        let width = p + 1;
+        let (count, length, stride, step) =
+            if along == 0 { (q + 1, p + 1, 1, width) } else { (p + 1, q + 1, width, 1) };
+        for line in 0..count {
+            let at = |i: usize| line * step + i * stride;
+            for level in 1..length {
+                for i in 0..length - level {
+                    second[at(i)] = (second[at(i)] + second[at(i + 1)]) * 0.5;
+                }
+                first[at(level)] = second[at(0)];
+            }
+        }
+        let middle = 0.5 * (node.low + node.high);
+        let (mut end, mut start) = (node.high, node.low);
+        end[along] = middle[along];
+        start[along] = middle[along];
+        let (piece, degree, pad, low, high) = (node.piece, node.degree, node.pad, node.low, node.high);
+        let a = Node::new(piece, [low, end], Some(index), degree, first, pad);
+        let b = Node::new(piece, [start, high], Some(index), degree, second, pad);
+        let children = [self.nodes.len(), self.nodes.len() + 1];
+        self.nodes.push(a);
+        self.nodes.push(b);
+        self.nodes[index].children = Some(children);
+        children
+    }
+}
+
+/// What a pair of nodes proves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Verdict {
+    /// The nodes do not meet.
+    Empty,
+    /// What they share is one arc near the line `x0 + tau w`, `w` in `range`, in the nodes' own coordinates x, y of
+    /// A and x, y of B.
+    Arc {
+        /// A point of the line.
+        x0: [f64; 4],
+        /// Its direction.
+        tau: [f64; 4],
+        /// Where it is within the (slightly enlarged) box.
+        range: [f64; 2],
+    },
+    /// Neither.
+    Unknown,
+}
+
+/// Decides about a pair; `gap` is the distance that counts as contact.
+pub fn judge(a: &Node, b: &Node, gap: f64) -> Verdict {
+    if !a.bounds.grown(gap).overlaps(&b.bounds) {
+        return Verdict::Empty;
+    }
+    let d = a.c - b.c;
+    for n in [a.n, b.n] {
+        let reach = n.dot(a.au).abs()
+            + n.dot(a.av).abs()
+            + n.dot(b.au).abs()
+            + n.dot(b.av).abs()
+            + a.reach(n, a.r)
+            + b.reach(n, b.r);
+        if d.dot(n).abs() > reach + gap {
+            return Verdict::Empty;
+        }
+    }
+    if a.n == DVec3::ZERO || b.n == DVec3::ZERO {
+        return Verdict::Unknown;
+    }
+    let columns = [a.au, a.av, -b.au, -b.av];
+    let m = columns.iter().fold(glam::DMat3::ZERO, |m, &v| m + glam::DMat3::from_cols(v * v.x, v * v.y, v * v.z));
+    let trace = m.x_axis.x + m.y_axis.y + m.z_axis.z;
+    if !(m.determinant() > 1e-26 * trace * trace * trace) {
+        return Verdict::Unknown;
+    }
+    let inverse = m.inverse();
+    let k: [DVec3; 4] = columns.map(|c| inverse * c);
+    let mut contraction: f64 = 0.0;
+    let mut rho = [0.0; 4];
+    for j in 0..4 {
+        let row = a.reach(k[j], a.dx) + a.reach(k[j], a.dy) + b.reach(k[j], b.dx) + b.reach(k[j], b.dy);
+        contraction = contraction.max(row);
+        rho[j] = a.reach(k[j], a.r) + b.reach(k[j], b.r) + k[j].length() * gap;
+    }
+    // The null direction: signed 3 x 3 minors.
+    let minor = |i: usize, j: usize, l: usize| columns[i].dot(columns[j].cross(columns[l]));
+    let mut tau = [minor(1, 2, 3), -minor(0, 2, 3), minor(0, 1, 3), -minor(0, 1, 2)];
+    let length = tau.iter().map(|t| t * t).sum::<f64>().sqrt();
+    if !(length > 0.0) {
+        return Verdict::Unknown;
+    }
+    tau.iter_mut().for_each(|t| *t /= length);
+    let x0 = k.map(|row| -row.dot(d));
+    let mut range = [f64::NEG_INFINITY, f64::INFINITY];
+    for j in 0..4 {
+        let limit = 1.0 + rho[j];
+        if tau[j].abs() < 1e-12 {
+            if x0[j].abs() > limit + 1e-9 {
+                return Verdict::Empty;
+            }
+            continue;
+        }
+        let (s, t) = ((-limit - x0[j]) / tau[j], (limit - x0[j]) / tau[j]);
+        range = [range[0].max(s.min(t)), range[1].min(s.max(t))];
+    }
+    if range[0] > range[1] {
+        return Verdict::Empty;
+    }
+    if contraction < 0.5 { Verdict::Arc { x0, tau, range } } else { Verdict::Unknown }
+}
+
+/// A polynomial net over a rectangle of a rational piece, and the error measured between the nodes.
+fn interpolated(piece: &Piece, rect: [DVec2; 2]) -> ([usize; 2], Vec<DVec3>, f64) {
+    use super::bernstein::{chebyshev_node, to_bernstein};
+    let degree = piece.degree.map(|d| (d + 4).min(10));
+    let [p, q] = degree;
+    let at = |x: f64, y: f64| piece.point(rect[0] + (rect[1] - rect[0]) * DVec2::new(x, y));
+    let mut net = Vec::with_capacity((p + 1) * (q + 1));
+    for j in 0..=q {
+        for i in 0..=p {
+            net.push(at(chebyshev_node(p, i), chebyshev_node(q, j)));
+        }
+    }
+    for k in 0..3 {
+        let values: Vec<f64> = net.iter().map(|v| v[k]).collect();
+        for (v, c) in net.iter_mut().zip(to_bernstein(degree, &values)) {
+            v[k] = c;
+        }
+    }
+    let poly = Piece {
+        surface: 0,
+        index: [0, 0],
+        degree,
+        rational: false,
+        points: net.iter().map(|v| v.extend(1.0)).collect(),
+        low: DVec2::ZERO,
+        high: DVec2::ONE,
+    };
+    let mut error: f64 = 0.0;
+    for j in 0..=q {
+        for i in 0..=p {
+            let middle = |n: usize, i: usize| 0.5 * (chebyshev_node(n, i) + chebyshev_node(n, (i + 1).min(n)));
+            let (x, y) = (middle(p, i), middle(q, j));
+            error = error.max(poly.point(DVec2::new(x, y)).distance(at(x, y)));
+        }
+    }
+    (degree, net, error)
+}
