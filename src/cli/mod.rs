@@ -14,6 +14,8 @@ pub mod info;
 pub mod intersect;
 mod output;
 pub mod ranges;
+#[cfg(feature = "editor")]
+pub mod render;
 
 pub use error::CliError;
 pub use exit::Exit;
@@ -46,6 +48,9 @@ pub enum Command {
     Convert(convert::Args),
     /// Intersect two sets of surfaces
     Intersect(intersect::Args),
+    /// Make a picture of a model
+    #[cfg(feature = "editor")]
+    Render(render::Args),
 }
 
 /// Runs a subcommand and says on standard error why it failed, if it did.
@@ -60,6 +65,8 @@ pub fn run(command: &Command, common: &Common) -> Exit {
         Command::Info(args) => info::run(args, common),
         Command::Convert(args) => convert::run(args, common),
         Command::Intersect(args) => intersect::run(args, common),
+        #[cfg(feature = "editor")]
+        Command::Render(args) => render::run(args, common),
     };
     result.unwrap_or_else(|error| {
         common.warn(format!("error: {}", error.message()));

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use crate::model::document::Document;
 
-mod atomic;
+pub(crate) mod atomic;
 pub mod autosave;
 mod format;
 pub mod iges;

@@ -2,6 +2,7 @@
 //! is plain data and is tested without a display.
 
 pub mod camera;
+pub mod deviation;
 pub mod display;
 pub mod navigation;
 pub mod pick;
