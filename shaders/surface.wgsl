@@ -70,7 +70,7 @@ fn gather(in: Varying, front: bool) -> Fragment {
 
     // A room of straight light tubes: the stripe is a function of the mirrored ray's elevation.
     let mirrored = reflect(-toward_eye, normal);
-    let tube = asin(clamp(mirrored.y * 0.94 + mirrored.x * 0.34, -1.0, 1.0)) * 7.0;
+    let tube = asin(clamp(mirrored.y * 0.94 + mirrored.x * 0.34, -1.0, 1.0)) * 5.5;
     let blur = max(fwidth(tube), 1e-6);
     let wave = abs(fract(tube) - 0.5) * 2.0;
     let sharp = clamp((wave - 0.5) / (2.0 * blur) + 0.5, 0.0, 1.0);
@@ -100,7 +100,10 @@ fn lit(base: vec3<f32>, f: Fragment, gloss: f32) -> vec3<f32> {
     let facing = clamp(dot(f.normal, f.toward_eye), 0.0, 1.0);
     let form = mix(0.74, 1.0, smoothstep(0.0, 0.55, facing));
     let shine = gloss * (0.13 * blinn(f, key, 48.0) + 0.05 * blinn(f, key, 9.0) + 0.035 * blinn(f, fill, 24.0));
-    return base * diffuse * form + vec3(shine);
+    let color = base * diffuse * form + vec3(shine);
+    // A soft shoulder: nothing burns out.
+    let over = max(color - vec3(0.7), vec3(0.0));
+    return min(color, vec3(0.7)) + 0.3 * over / (over + vec3(0.3));
 }
 
 fn finish(in: Varying, f: Fragment, base: vec4<f32>, gloss: f32) -> vec4<f32> {

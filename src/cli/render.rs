@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use clap::ValueEnum;
+use glam::DVec2;
 use serde::Serialize;
 
 use super::{CliError, Common, Exit};
+use crate::kernel::geom::Aabb;
 use crate::kernel::job::Job;
 use crate::kernel::mesh::surface_set::SurfaceSet;
 use crate::model::document::{Document, EntityId};
@@ -20,6 +22,8 @@ use crate::view::viewport::{View, Viewport};
 /// How finely originals are tessellated to measure deviations, as a fraction of the diagonal; closest points are exact
 /// whatever this is.
 const MEASURE: f64 = 1e-4;
+/// The part of the picture that a framed model fills.
+const MARGIN: f64 = 0.86;
 /// Distances beyond this fraction of the diagonal are no deviations.
 const FAR: f64 = 0.05;
 
@@ -237,7 +241,7 @@ fn view(args: &Args, document: &Document, scene: &mut Scene) -> Result<View, Cli
     if let Some([right, up]) = args.turn {
         // Half a turn for the height of the picture; the eye goes where the turn says.
         let pixels = viewport.height / 180.0;
-        camera.orbit(camera.target, glam::DVec2::new(-right, up) * pixels, viewport);
+        camera.orbit(camera.target, DVec2::new(-right, up) * pixels, viewport);
     }
     // The first displays say where things really are, the second ones are as fine as that view needs.
     let mut view = View::new(&camera, viewport, &scene.bounds());
@@ -247,10 +251,39 @@ fn view(args: &Args, document: &Document, scene: &mut Scene) -> Result<View, Cli
             None => scene.bounds(),
         };
         camera.frame(&bounds, viewport);
+        fill(&mut camera, viewport, scene, &bounds, |id| framed.as_ref().is_none_or(|ids| ids.contains(&id)));
         view = View::new(&camera, viewport, &scene.bounds());
         scene.refine(&view);
     }
     Ok(view)
+}
+
+/// Moves the camera so that what is framed fills the picture but for a margin: `Camera::frame` makes room for a model
+/// that is turned, a picture stands still.
+fn fill(camera: &mut Camera, viewport: Viewport, scene: &Scene, bounds: &Aabb, framed: impl Fn(EntityId) -> bool) {
+    let shown = scene.items().iter().filter(|item| item.visible() && framed(item.id()));
+    let points: Vec<_> = shown
+        .filter_map(|item| item.display.as_ref())
+        .flat_map(|d| d.curves.iter().flat_map(|c| &c.points).chain(&d.mesh.points))
+        .collect();
+    // Coming closer changes the perspective, which changes what fills the picture; it settles quickly.
+    for _ in 0..4 {
+        let view = View::new(camera, viewport, bounds);
+        let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        for at in points.iter().filter_map(|p| view.project(**p)) {
+            low = low.min(at.pixel);
+            high = high.max(at.pixel);
+        }
+        if !(low.is_finite() && high.is_finite()) {
+            return;
+        }
+        let size = DVec2::new(viewport.width, viewport.height);
+        let part = ((high - low) / (MARGIN * size)).max_element();
+        camera.pan(viewport, camera.distance, 0.5 * (low + high), viewport.center());
+        if part > 1e-6 {
+            camera.distance *= part;
+        }
+    }
 }
 
 /// Deviations of the patches from the surfaces, or of everything from another model.

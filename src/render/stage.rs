@@ -191,8 +191,15 @@ fn opaque([r, g, b]: [f32; 3]) -> Color {
     [r, g, b, 1.0]
 }
 
+/// A file's colour as paint: pure red, white and black have no room for light and shade, so it is drawn in a little from
+/// all ends.
+fn paint(color: [f32; 3]) -> Color {
+    let luma = 0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2];
+    opaque(color.map(|c| 0.02 + 0.68 * (0.84 * c + 0.16 * luma).clamp(0.0, 1.0)))
+}
+
 fn color_of(item: &Item, at: usize, look: &Look) -> Color {
-    let own = item.entity.color.map(opaque);
+    let own = item.entity.color.map(paint);
     match (look.coloring, item.kind) {
         (Coloring::Palette, _) => srgb(PALETTE[at % PALETTE.len()]),
         (Coloring::Plain, ItemKind::Patch) => own.unwrap_or(look.theme.patch),
