@@ -11,6 +11,7 @@ pub mod convert;
 mod error;
 mod exit;
 pub mod info;
+mod interrupt;
 pub mod intersect;
 mod output;
 pub mod ranges;
@@ -19,6 +20,7 @@ pub mod render;
 
 pub use error::CliError;
 pub use exit::Exit;
+pub use interrupt::job;
 pub use output::{Common, ProgressLine};
 
 /// Heals broken CAD surface models and shows where surfaces truly intersect.
@@ -68,10 +70,11 @@ pub fn run(command: &Command, common: &Common) -> Exit {
         #[cfg(feature = "editor")]
         Command::Render(args) => render::run(args, common),
     };
-    result.unwrap_or_else(|error| {
+    let exit = result.unwrap_or_else(|error| {
         common.warn(format!("error: {}", error.message()));
         error.exit()
-    })
+    });
+    if interrupt::stopped() { Exit::Cancelled } else { exit }
 }
 
 #[cfg(test)]
