@@ -9,4 +9,5 @@ pub mod pick;
 pub mod scene;
 pub mod section;
 pub mod segment_tree;
+pub mod snap;
 pub mod viewport;
