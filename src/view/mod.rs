@@ -5,6 +5,7 @@ pub mod camera;
 pub mod deviation;
 pub mod display;
 pub mod navigation;
+pub mod patch_tool;
 pub mod pick;
 pub mod scene;
 pub mod section;
