@@ -9,9 +9,10 @@ use clap::{Parser, Subcommand};
 
 pub mod convert;
 mod error;
+pub mod examples;
 mod exit;
+pub mod heal;
 pub mod info;
-mod interrupt;
 pub mod intersect;
 mod output;
 pub mod ranges;
@@ -20,7 +21,6 @@ pub mod render;
 
 pub use error::CliError;
 pub use exit::Exit;
-pub use interrupt::job;
 pub use output::{Common, ProgressLine};
 
 /// Heals broken CAD surface models and shows where surfaces truly intersect.
@@ -53,6 +53,11 @@ pub enum Command {
     /// Make a picture of a model
     #[cfg(feature = "editor")]
     Render(render::Args),
+    /// Lay B-spline patches over the broken parts of a model
+    Heal(heal::Args),
+    /// Write the bundled example models
+    #[command(hide = true)]
+    Examples(examples::Args),
 }
 
 /// Runs a subcommand and says on standard error why it failed, if it did.
@@ -69,12 +74,13 @@ pub fn run(command: &Command, common: &Common) -> Exit {
         Command::Intersect(args) => intersect::run(args, common),
         #[cfg(feature = "editor")]
         Command::Render(args) => render::run(args, common),
+        Command::Heal(args) => heal::run(args, common),
+        Command::Examples(args) => examples::run(args, common),
     };
-    let exit = result.unwrap_or_else(|error| {
+    result.unwrap_or_else(|error| {
         common.warn(format!("error: {}", error.message()));
         error.exit()
-    });
-    if interrupt::stopped() { Exit::Cancelled } else { exit }
+    })
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 pub mod command;
 pub mod document;
+pub mod examples;
 pub mod healing;
 pub mod history;
 pub mod resolve;

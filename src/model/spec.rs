@@ -31,6 +31,56 @@ pub struct HealSpec {
     pub patches: Vec<PatchSpec>,
 }
 
+/// Why a text is no patch specification.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("line {line}, column {column}: {reason}")]
+pub struct SpecError {
+    /// Where it goes wrong, from 1.
+    pub line: usize,
+    /// Where in the line, from 1.
+    pub column: usize,
+    /// What is wrong there.
+    pub reason: String,
+}
+
+impl HealSpec {
+    /// Reads a specification. Options may be written without `Some`.
+    pub fn from_ron(text: &str) -> Result<Self, SpecError> {
+        ron_options().from_str(text).map_err(|error| SpecError {
+            line: error.span.start.line,
+            column: error.span.start.col,
+            reason: error.code.to_string(),
+        })
+    }
+
+    /// Writes a specification so that [`Self::from_ron`] reads the same.
+    pub fn to_ron(&self) -> Result<String, ron::Error> {
+        let pretty = ron::ser::PrettyConfig::new().depth_limit(4).indentor("  ").new_line("\n").struct_names(false);
+        let mut text = ron_options().to_string_pretty(self, pretty)?;
+        text.push('\n');
+        Ok(text)
+    }
+}
+
+fn ron_options() -> ron::Options {
+    ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME)
+}
+
+/// Four values as a list: RON writes arrays of fixed size as tuples, and four sides are a list to people.
+mod four {
+    use serde::de::{Deserialize, Deserializer, Error};
+    use serde::ser::{Serialize, Serializer};
+
+    pub fn serialize<T: Serialize, S: Serializer>(values: &[T; 4], to: S) -> Result<S::Ok, S::Error> {
+        values.as_slice().serialize(to)
+    }
+
+    pub fn deserialize<'de, T: Deserialize<'de>, D: Deserializer<'de>>(from: D) -> Result<[T; 4], D::Error> {
+        let values = Vec::<T>::deserialize(from)?;
+        <[T; 4]>::try_from(values).map_err(|v| D::Error::invalid_length(v.len(), &"exactly four"))
+    }
+}
+
 fn default_max_resolution() -> usize {
     128
 }
@@ -46,9 +96,10 @@ pub struct PatchSpec {
     /// What it is called.
     pub name: String,
     /// What becomes of each side's curve.
-    #[serde(default)]
+    #[serde(default, with = "four")]
     pub boundary: [BoundaryMode; 4],
     /// The pieces of each side, in any order and direction.
+    #[serde(with = "four")]
     pub sides: [Vec<Piece>; 4],
     /// What was decided by hand about how the sides meet; nothing when left out.
     #[serde(default, skip_serializing_if = "Joining::is_default")]
@@ -145,4 +196,47 @@ pub enum IsoAt {
     U(f64),
     /// v is fixed; the curve runs along u.
     V(f64),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The example of the manual.
+    const MANUAL: &str = "(joining_tol: 1e-3, tol: 1e-4, max_resolution: 128, onto: [0, 1, 2, 3], slab: None, \
+        neighbours: 8, patches: [ (name: \"nose\", boundary: [Keep, Keep, Project, Keep], sides: [ \
+        [Iso(surface: 0, at: U(1.0), from: 1.0, to: 7.0)], // at U(c): runs along v\n \
+        [Edge(face: 2, loop: 0, edge: 3, from: 0.0, to: 1.0), Line((0,0,0), (1,0,0))], \
+        [Polyline([(0,0,0), (1,0,0)])], [Curve(id: 12, from: 0.0, to: 0.4)]])])";
+
+    #[test]
+    fn the_manual_is_read_and_written_back_the_same() {
+        let spec = HealSpec::from_ron(MANUAL).unwrap();
+        assert_eq!((spec.tol, spec.onto.as_deref()), (Some(1e-4), Some(&[0, 1, 2, 3][..])));
+        assert_eq!(spec.patches[0].boundary[2], BoundaryMode::Project);
+        assert_eq!(spec.patches[0].sides[1].len(), 2);
+        let text = spec.to_ron().unwrap();
+        assert_eq!(HealSpec::from_ron(&text).unwrap(), spec, "{text}");
+    }
+
+    #[test]
+    fn short_specifications_take_the_defaults() {
+        let side = "[Polyline([(0,0,0), (1,0,0)])]";
+        let spec =
+            HealSpec::from_ron(&format!("(patches: [(name: \"a\", sides: [{}])])", [side; 4].join(", "))).unwrap();
+        assert_eq!((spec.tol, spec.max_resolution, spec.neighbours), (None, 128, 8));
+        assert_eq!(spec.patches[0].boundary, [BoundaryMode::Keep; 4]);
+    }
+
+    #[test]
+    fn errors_say_where() {
+        let three = MANUAL.replace(", [Curve(id: 12, from: 0.0, to: 0.4)]", "");
+        let error = HealSpec::from_ron(&three).unwrap_err();
+        assert!(error.reason.contains("four"), "{error}");
+        let error = HealSpec::from_ron("(\n  patchs: [])").unwrap_err();
+        assert!(error.line == 2 && error.reason.contains("patchs"), "{error}");
+        for garbage in ["", "\u{0}\u{1}", "(patches: [(name: \"a\"", "(patches: 1e999)"] {
+            assert!(HealSpec::from_ron(garbage).is_err());
+        }
+    }
 }
