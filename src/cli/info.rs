@@ -7,7 +7,8 @@ use serde::Serialize;
 use super::{CliError, Common, Exit};
 use crate::io::{self, ImportReport, Severity};
 use crate::kernel::geom::{Aabb, Knots};
-use crate::model::document::{Entity, Shape};
+use crate::model::borders::{Meets, borders};
+use crate::model::document::{Document, Entity, Shape};
 
 /// Arguments of `info`.
 #[derive(Debug, clap::Args)]
@@ -27,6 +28,8 @@ struct Info {
     curves: usize,
     patches: usize,
     bounds: Option<Bounds>,
+    /// How the borders of the whole surfaces meet.
+    borders: BorderInfo,
     entities: Vec<EntityInfo>,
     import: ImportReport,
 }
@@ -45,6 +48,40 @@ impl Bounds {
             max: bounds.max.to_array(),
             diagonal: bounds.diagonal(),
         })
+    }
+}
+
+#[derive(Default, Serialize)]
+struct BorderInfo {
+    /// What two borders may be apart and still be one.
+    joining: f64,
+    free: usize,
+    /// Along others on a part of their length.
+    partly: usize,
+    shared: usize,
+    /// Of the shared ones, those that are further off than contact.
+    gaps: usize,
+    largest_gap: f64,
+    poles: usize,
+}
+
+impl BorderInfo {
+    fn of(document: &Document) -> Self {
+        let tolerances = document.tolerances();
+        let mut info = Self { joining: tolerances.joining, ..Self::default() };
+        for border in borders(document, tolerances.joining) {
+            match border.meets {
+                Meets::Free => info.free += 1,
+                Meets::Pole => info.poles += 1,
+                Meets::Partly { .. } => info.partly += 1,
+                Meets::Shared { gap } => {
+                    info.shared += 1;
+                    info.gaps += usize::from(gap > tolerances.gap);
+                    info.largest_gap = info.largest_gap.max(gap);
+                }
+            }
+        }
+        info
     }
 }
 
@@ -132,6 +169,14 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         let point = |p: [f64; 3]| format!("({}, {}, {})", p[0], p[1], p[2]);
         common.say(format!("box: {} to {}, diagonal {}", point(b.min), point(b.max), b.diagonal));
     }
+    let border = BorderInfo::of(document);
+    if surfaces > 0 {
+        common.say(format!(
+            "borders of the whole surfaces, joined within {:.3e}: {} free, {} partly shared, {} shared ({} with gaps, the \
+             largest {:.3e}), {} poles",
+            border.joining, border.free, border.partly, border.shared, border.gaps, border.largest_gap, border.poles
+        ));
+    }
     if args.all {
         entities.iter().for_each(|e| common.say(format!("  {}", e.line())));
         opened.report.lines.iter().for_each(|line| common.say(format!("  {line}")));
@@ -145,6 +190,7 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         curves,
         patches,
         bounds: Bounds::of(&bounds),
+        borders: border,
         entities,
         import: opened.report,
     })?;

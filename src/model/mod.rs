@@ -1,5 +1,6 @@
 //! What a user has: documents, the commands that change them, and undo.
 
+pub mod borders;
 pub mod command;
 pub mod document;
 pub mod examples;
