@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use super::{CliError, Common, Exit, ProgressLine, ranges};
 use crate::io::{self, SaveOptions};
 use crate::kernel::geom::{Curve, Surface};
-use crate::kernel::job::Job;
 use crate::kernel::ssi::{Intersection, SsiOptions, intersect};
 use crate::model::document::{Document, Shape};
 
@@ -62,7 +61,7 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         list.iter().map(one).collect()
     };
     let (side_a, side_b) = (pick(&a)?, pick(&b)?);
-    let job = Job::new();
+    let job = super::job();
     let options = SsiOptions { tol: args.tol, ..SsiOptions::default() };
     let progress = ProgressLine::watch(&job);
     let result = intersect(&side_a, &side_b, &options, &job).map_err(|e| CliError::BadArguments(e.to_string()))?;

@@ -13,6 +13,7 @@ pub mod examples;
 mod exit;
 pub mod heal;
 pub mod info;
+mod interrupt;
 pub mod intersect;
 mod output;
 pub mod ranges;
@@ -21,6 +22,7 @@ pub mod render;
 
 pub use error::CliError;
 pub use exit::Exit;
+pub use interrupt::job;
 pub use output::{Common, ProgressLine};
 
 /// Heals broken CAD surface models and shows where surfaces truly intersect.
@@ -77,10 +79,11 @@ pub fn run(command: &Command, common: &Common) -> Exit {
         Command::Heal(args) => heal::run(args, common),
         Command::Examples(args) => examples::run(args, common),
     };
-    result.unwrap_or_else(|error| {
+    let exit = result.unwrap_or_else(|error| {
         common.warn(format!("error: {}", error.message()));
         error.exit()
-    })
+    });
+    if interrupt::stopped() { Exit::Cancelled } else { exit }
 }
 
 #[cfg(test)]

@@ -10,7 +10,6 @@ use serde::Serialize;
 
 use super::{CliError, Common, Exit};
 use crate::kernel::geom::Aabb;
-use crate::kernel::job::Job;
 use crate::kernel::mesh::surface_set::SurfaceSet;
 use crate::model::document::{Document, EntityId};
 use crate::render::{ColorScale, Coloring, Display, Emphasis, Field, Gpu, Key, Look, Offscreen, Stage, Theme};
@@ -302,7 +301,7 @@ fn measure(args: &Args, document: &Document, scene: &Scene) -> Result<(Vec<(Key,
         ));
     }
     let diagonal = originals.bounds().diagonal();
-    let job = Job::new();
+    let job = super::job();
     let set = SurfaceSet::new(surfaces, MEASURE * diagonal, &job);
     let noise = originals.tolerances().follow;
     let found: Vec<_> = subjects

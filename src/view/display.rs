@@ -95,6 +95,30 @@ impl Geometry {
         }
     }
 
+    /// One of its curves as a curve of its own, with the same parameter.
+    pub fn curve(&self, curve: &CurveRef) -> Option<Curve> {
+        match (self, curve) {
+            (Self::Curve(c), CurveRef::Free(_)) => Some(c.as_ref().clone()),
+            (Self::Surface(s), CurveRef::Border(_, side)) => s.border(*side).ok(),
+            (Self::Surface(s), CurveRef::Iso(_, fixed, c)) => s.iso_curve(*fixed, *c).ok(),
+            _ => None,
+        }
+    }
+
+    /// The interior knots of one of its curves.
+    pub fn curve_knots(&self, curve: &CurveRef) -> Vec<f64> {
+        let knots = match (self, curve) {
+            (Self::Curve(c), CurveRef::Free(_)) => c.knots(),
+            (Self::Surface(s), CurveRef::Border(_, Side::VMin | Side::VMax) | CurveRef::Iso(_, Direction::V, _)) => {
+                &s.knots()[0]
+            }
+            (Self::Surface(s), CurveRef::Border(..) | CurveRef::Iso(..)) => &s.knots()[1],
+            _ => return Vec::new(),
+        };
+        let breaks = knots.breaks();
+        breaks[1..breaks.len() - 1].to_vec()
+    }
+
     /// The point of one of its curves with first and second derivative.
     pub fn curve_jet(&self, curve: &CurveRef, t: f64) -> Option<[DVec3; 3]> {
         match self {

@@ -276,7 +276,12 @@ fn best_curve(scene: &Scene, pyramid: &mut Pyramid, options: &PickOptions) -> Op
 }
 
 /// The nearest place of each of the `limit` nearest curves within the pyramid, nearest in pixels first.
-fn curve_candidates(scene: &Scene, pyramid: &mut Pyramid, options: &PickOptions, limit: usize) -> Vec<PickHit> {
+pub(super) fn curve_candidates(
+    scene: &Scene,
+    pyramid: &mut Pyramid,
+    options: &PickOptions,
+    limit: usize,
+) -> Vec<PickHit> {
     let mut found: Vec<(Near, CurveRef)> = Vec::new();
     if !options.filter.any_curve() {
         return Vec::new();

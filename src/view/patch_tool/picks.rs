@@ -1,0 +1,295 @@
+//! What clicks do: curves, surfaces and their iso-curves, points, splits, shared sides.
+
+use glam::{DVec2, DVec3};
+
+use super::arrange::{self, SideLine};
+use super::follow::joint_angles;
+use super::piece::{Picked, PieceError};
+use super::{Mode, PatchTool, SidePick, Stage, sentence};
+use crate::kernel::geom::Direction;
+use crate::view::display::CurveRef;
+use crate::view::navigation::Modifiers;
+use crate::view::pick::{PickHit, Target};
+use crate::view::scene::{ItemKind, Scene};
+use crate::view::snap::Snap;
+
+/// A curve carries on a side when it turns by less than this at the joint, in degrees.
+const CARRIES_ON: f64 = 30.0;
+
+impl PatchTool {
+    pub(super) fn click(&mut self, hit: Option<PickHit>, snap: Option<Snap>, held: Modifiers, scene: &Scene) {
+        let Stage::Side(side) = self.stage else {
+            match self.stage {
+                Stage::Review => self.refuse("All four sides are picked; 1-4 goes back to one, Enter heals"),
+                Stage::Running => self.refuse("Still healing; Esc cancels"),
+                Stage::Result => self.refuse("Judge the patch first; Enter accepts, 1-4 adjusts, Esc discards"),
+                Stage::Idle | Stage::Side(_) => {}
+            }
+            return;
+        };
+        match &self.mode {
+            Mode::Line(_) | Mode::Polyline(_) | Mode::Draw(_) => {
+                match snap.map(|s| s.point).or(hit.map(|h| h.point)) {
+                    Some(p) => self.add_point(p, scene),
+                    None => self.refuse("No point here; click on a curve or a surface"),
+                }
+                return;
+            }
+            Mode::Iso { entity, fixed, .. } => {
+                let (entity, fixed) = (*entity, *fixed);
+                if let Some(PickHit { target: Target::Surface { entity: clicked, .. }, point, .. }) = hit
+                    && clicked == entity
+                {
+                    self.take_iso(Some(point), fixed, scene);
+                    return;
+                }
+                self.mode = Mode::Curves;
+            }
+            Mode::Curves => {}
+        }
+        let Some(hit) = hit else {
+            self.refuse("Nothing to pick here; curves are picked within 16 pixels");
+            return;
+        };
+        match hit.target {
+            Target::Curve { curve, t } => self.click_curve(side, curve, t, hit.point, held, scene),
+            Target::Surface { entity, uv } => self.click_surface(entity, uv, hit.point, scene),
+            Target::Point(_) => self.refuse("A point is no side; L draws a segment between two points"),
+        }
+    }
+
+    pub(super) fn click_surface(
+        &mut self,
+        entity: crate::model::document::EntityId,
+        uv: DVec2,
+        point: DVec3,
+        scene: &Scene,
+    ) {
+        if scene.item(entity).is_some_and(|item| item.kind == ItemKind::Patch) {
+            match self.reusable_at(point) {
+                Some(side) => self.reuse(side),
+                None => self.refuse("A healed patch has no iso-curves to pick; click one of its sides to share it"),
+            }
+            return;
+        }
+        self.mode = Mode::Iso { entity, uv, fixed: Direction::U };
+    }
+
+    pub(super) fn click_curve(
+        &mut self,
+        side: usize,
+        curve: CurveRef,
+        t: f64,
+        point: DVec3,
+        held: Modifiers,
+        scene: &Scene,
+    ) {
+        if scene.curve_item(&curve).is_some_and(|item| item.kind == ItemKind::Patch) {
+            match self.reusable_at(point) {
+                Some(side) => self.reuse(side),
+                None => self.refuse("Only the patch that was accepted last can share its sides"),
+            }
+            return;
+        }
+        // What other pieces have of this curve, to find the stretch around the click that is still free.
+        let mut free = [f64::NEG_INFINITY, f64::INFINITY];
+        for (k, other) in self.sides.iter().enumerate() {
+            for (index, piece) in other.pieces.iter().enumerate() {
+                let Some((_, range)) = piece.stretch().filter(|(c, _)| *c == curve) else { continue };
+                if t <= range[0] {
+                    free[1] = free[1].min(range[0]);
+                } else if t >= range[1] {
+                    free[0] = free[0].max(range[1]);
+                } else if held.shift {
+                    self.split(k, index, point, scene);
+                    return;
+                } else {
+                    self.refuse(format!(
+                        "This is a piece of side {} already; Shift+click splits it, Backspace takes it back",
+                        k + 1
+                    ));
+                    return;
+                }
+            }
+        }
+        let domain = scene.curve_item(&curve).and_then(|item| item.geometry.curve_domain(&curve));
+        let range = domain.map(|[a, b]| [a.max(free[0]), b.min(free[1])]);
+        match Picked::of_curve(scene, curve, range, t) {
+            Ok(piece) if held.shift => match piece.split(scene, point) {
+                Ok([a, b]) => {
+                    if self.add(side, a) {
+                        let Stage::Side(side) = self.stage else { return };
+                        self.sides[side].pieces.push(b);
+                        self.say("Split in two pieces; Backspace takes the second one back");
+                    }
+                }
+                Err(_) => self.refuse("The split would leave a piece without length; click farther from the end"),
+            },
+            Ok(piece) => {
+                self.add(side, piece);
+            }
+            Err(error) => self.refuse(sentence(&error.to_string())),
+        }
+    }
+
+    pub(super) fn split(&mut self, side: usize, index: usize, at: DVec3, scene: &Scene) {
+        if self.sides[side].shared {
+            self.refuse_shared(side);
+            return;
+        }
+        match self.sides[side].pieces[index].split(scene, at) {
+            Ok([a, b]) => {
+                let pieces = &mut self.sides[side].pieces;
+                pieces[index] = a;
+                // Last, so that Backspace takes it back.
+                pieces.push(b);
+                self.say(format!("Split in two pieces of side {}; Backspace takes the second one back", side + 1));
+            }
+            Err(_) => self.refuse("The split would leave a piece without length; click farther from the end"),
+        }
+    }
+
+    pub(super) fn refuse_shared(&mut self, side: usize) {
+        self.refuse(format!(
+            "Side {} is shared with its neighbour, and two patches share a side whole; Backspace takes it out",
+            side + 1
+        ));
+    }
+
+    /// Adds a piece to a side, or to the next one when it does not carry this one on. False when there is no place.
+    pub(super) fn add(&mut self, side: usize, piece: Picked) -> bool {
+        let line = arrange::chain(&self.sides[side].pieces);
+        let carries_on = line.as_ref().is_none_or(|line| self.carries_on(line, &piece, CARRIES_ON));
+        let mut target = side;
+        if self.sides[side].shared || !(carries_on || self.holding) {
+            match self.next_empty(side) {
+                Some(next) => {
+                    target = next;
+                    let why =
+                        if self.sides[side].shared { "is shared whole" } else { "is not carried on by this curve" };
+                    self.say(format!("Side {} {why}, so side {} was started; Backspace undoes", side + 1, next + 1));
+                }
+                None if self.sides[side].shared => {
+                    self.refuse_shared(side);
+                    return false;
+                }
+                None => {
+                    self.refuse("All four sides have curves; 1-4 goes to a side to add to it, Backspace takes one out");
+                    return false;
+                }
+            }
+        } else if let Some(line) = line
+            && !carries_on
+        {
+            let gap = ends_apart(&line, &piece);
+            if gap > self.options.joining_tol {
+                self.say(format!("This piece misses the rest of side {} by {}", side + 1, self.length(gap)));
+            }
+        }
+        let [a, b] = piece.ends();
+        if a.distance(b) <= self.options.joining_tol && self.notice.is_none() {
+            let text =
+                format!("Side {} closes on itself; Shift+click splits it, so that the loop has corners", target + 1);
+            self.say(text);
+        }
+        self.touch(target);
+        self.sides[target].pieces.push(piece);
+        self.stage = Stage::Side(target);
+        if target != side {
+            self.holding = false;
+        }
+        true
+    }
+
+    /// What was decided about the corners of a side no longer holds.
+    pub(super) fn touch(&mut self, side: usize) {
+        self.chosen.retain(|(pair, _)| !pair.contains(&side));
+    }
+
+    /// Whether a piece starts at an end of a line and turns by less than an angle there.
+    pub(super) fn carries_on(&self, line: &SideLine, piece: &Picked, degrees: f64) -> bool {
+        joint_angles(line, piece, self.options.joining_tol).iter().any(|(_, angle)| *angle <= degrees)
+    }
+
+    pub(super) fn next_empty(&self, side: usize) -> Option<usize> {
+        (1..4).map(|k| (side + k) % 4).find(|&k| self.sides[k].pieces.is_empty())
+    }
+
+    pub(super) fn add_point(&mut self, p: DVec3, scene: &Scene) {
+        let (Mode::Line(points) | Mode::Polyline(points) | Mode::Draw(points)) = &mut self.mode else { return };
+        if points.last().is_some_and(|q| *q == p) {
+            self.refuse("This is the same point again; pick another one");
+            return;
+        }
+        points.push(p);
+        if matches!(&self.mode, Mode::Line(points) if points.len() == 2) {
+            self.finish_points(scene);
+        }
+    }
+
+    pub(super) fn finish_points(&mut self, scene: &Scene) {
+        let Stage::Side(side) = self.stage else { return };
+        let made = match &self.mode {
+            Mode::Line(points) if points.len() == 2 => Picked::line(points[0], points[1]),
+            Mode::Polyline(points) => Picked::polyline(points),
+            Mode::Draw(points) => Picked::drawn(scene, points),
+            _ => return,
+        };
+        match made {
+            Ok(piece) => {
+                self.mode = Mode::Curves;
+                self.add(side, piece);
+            }
+            Err(error) => self.refuse(sentence(&error.to_string())),
+        }
+    }
+
+    /// Takes the iso-curve with `fixed`, or of the two the one that is nearer to a point.
+    pub(super) fn take_iso(&mut self, near: Option<DVec3>, fixed: Direction, scene: &Scene) {
+        let Stage::Side(side) = self.stage else { return };
+        let Some([first, second]) = self.iso_choice(scene) else {
+            self.mode = Mode::Curves;
+            self.refuse(sentence(&PieceError::Gone.to_string()));
+            return;
+        };
+        debug_assert!(matches!(self.mode, Mode::Iso { fixed: f, .. } if f == fixed));
+        let other = near.is_some_and(|p| second.distance(p) < 0.5 * first.distance(p));
+        self.mode = Mode::Curves;
+        self.add(side, if other { second } else { first });
+    }
+
+    pub(super) fn reusable_at(&self, point: DVec3) -> Option<usize> {
+        let tol = 2.0 * self.options.joining_tol;
+        let sides = self.reusable().into_iter().map(|(k, points)| (k, super::piece::nearest_on(&points, point).1));
+        sides.filter(|(_, d)| *d <= tol).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
+    }
+
+    pub(super) fn reuse(&mut self, from: usize) {
+        let Stage::Side(current) = self.stage else {
+            self.refuse("A side can be shared while sides are picked");
+            return;
+        };
+        let Some(source) = self.last.as_ref().and_then(|last| last.get(from)).cloned() else {
+            self.refuse("There is no accepted patch to share a side with");
+            return;
+        };
+        if self.sides.iter().any(|s| s.pieces == source.pieces) {
+            self.refuse("This side is shared already");
+            return;
+        }
+        let empty = self.sides[current].pieces.is_empty();
+        let Some(side) = (if empty { Some(current) } else { self.next_empty(current) }) else {
+            self.refuse("All four sides have curves; Backspace takes one out");
+            return;
+        };
+        self.touch(side);
+        self.sides[side] = SidePick { shared: true, flipped: false, ..source };
+        self.stage = Stage::Side(side);
+        self.say(format!("Side {} is shared with the accepted patch", side + 1));
+    }
+}
+
+fn ends_apart(line: &SideLine, piece: &Picked) -> f64 {
+    let ends = piece.ends();
+    line.ends().iter().flat_map(|a| ends.map(|b| a.distance(b))).fold(f64::INFINITY, f64::min)
+}
