@@ -16,8 +16,20 @@ fn main() -> ExitCode {
 }
 
 /// Opens the editor on the files, or on the bundled example when there are none.
+#[cfg(feature = "editor")]
+fn edit(files: Vec<PathBuf>) -> Exit {
+    match patchwright::ui::run(files) {
+        Ok(()) => Exit::Done,
+        Err(reason) => {
+            eprintln!("{reason}");
+            Exit::Failed
+        }
+    }
+}
+
+/// Says that there is no window.
+#[cfg(not(feature = "editor"))]
 fn edit(_files: Vec<PathBuf>) -> Exit {
-    // With the feature `editor` this becomes `ui::run(files)`.
     eprintln!("This build of patchwright has no window; see `patchwright --help` for its subcommands.");
     Exit::Failed
 }

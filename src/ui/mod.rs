@@ -1,3 +1,22 @@
-//! The window: egui and nothing below it.
+//! The editor's window, made with egui. Everything a user can do is in [`actions`]; what each action does is in
+//! [`editor`]; the rest draws. Nothing here computes: that happens in workers and in the layers below.
 
+mod actions;
+mod app;
+mod autosave;
+mod bars;
+mod dialogs;
+mod editor;
+mod files;
+mod hints;
+mod icons;
 pub mod paint;
+mod palette;
+mod panels;
+mod settings;
+mod status;
+mod theme;
+mod tools;
+mod viewport;
+
+pub use app::{App, Options, run};

@@ -1,0 +1,338 @@
+//! The list of everything a user can do. Menus, the toolbar, shortcuts, the command palette and the list of keys
+//! are all made from it. What changes a document goes on as a [`crate::model::command::Command`].
+
+use egui::{Key, KeyboardShortcut, Modifiers};
+
+use super::icons::Icon;
+
+/// One thing a user can do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[allow(missing_docs, reason = "each is described by its entry in ACTIONS")]
+pub enum Action {
+    Open,
+    OpenExample,
+    Save,
+    SaveAs,
+    SaveSpec,
+    Quit,
+    Undo,
+    Redo,
+    SelectAll,
+    Deselect,
+    Rename,
+    Delete,
+    Settings,
+    Hide,
+    Isolate,
+    ShowAll,
+    FrameAll,
+    FrameSelection,
+    Front,
+    Back,
+    Right,
+    Left,
+    Top,
+    Bottom,
+    Perspective,
+    Shaded,
+    Wireframe,
+    Xray,
+    Edges,
+    IsoLines,
+    Section,
+    LightTheme,
+    DarkTheme,
+    LeftPanel,
+    RightPanel,
+    ShowTool,
+    ShowPatches,
+    ShowHistory,
+    ShowJobs,
+    ShowReport,
+    SelectTool,
+    CancelJobs,
+    Palette,
+    Keys,
+    About,
+}
+
+/// The menus, in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the names are the titles")]
+pub enum Menu {
+    File,
+    Edit,
+    View,
+    Heal,
+    Help,
+}
+
+impl Menu {
+    /// All menus.
+    pub const ALL: [Self; 5] = [Self::File, Self::Edit, Self::View, Self::Heal, Self::Help];
+
+    /// What the menu bar writes.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::File => "File",
+            Self::Edit => "Edit",
+            Self::View => "View",
+            Self::Heal => "Heal",
+            Self::Help => "Help",
+        }
+    }
+}
+
+/// What is known of an action.
+#[derive(Clone, Copy, Debug)]
+pub struct Info {
+    /// Which action.
+    pub action: Action,
+    /// Its name, in sentence case, with an ellipsis where more input follows.
+    pub name: &'static str,
+    /// Where it stands.
+    pub menu: Menu,
+    /// Actions of one menu with different groups are kept apart by a line.
+    pub group: u8,
+    /// Its key.
+    pub shortcut: Option<KeyboardShortcut>,
+    /// Its picture on the toolbar.
+    pub icon: Option<Icon>,
+    /// One sentence for tooltips and the palette.
+    pub help: &'static str,
+}
+
+const fn key(modifiers: Modifiers, key: Key) -> Option<KeyboardShortcut> {
+    Some(KeyboardShortcut::new(modifiers, key))
+}
+
+const fn entry(
+    action: Action,
+    menu: Menu,
+    group: u8,
+    name: &'static str,
+    shortcut: Option<KeyboardShortcut>,
+    help: &'static str,
+) -> Info {
+    Info { action, name, menu, group, shortcut, icon: None, help }
+}
+
+const fn with(icon: Icon, info: Info) -> Info {
+    Info { icon: Some(icon), ..info }
+}
+
+const NONE: Modifiers = Modifiers::NONE;
+const CTRL: Modifiers = Modifiers::COMMAND;
+const SHIFT: Modifiers = Modifiers::SHIFT;
+const ALT: Modifiers = Modifiers::ALT;
+const CTRL_SHIFT: Modifiers = Modifiers::COMMAND.plus(Modifiers::SHIFT);
+
+use Menu::{Edit, File, Heal, Help, View};
+
+/// Every action, in menu order.
+pub const ACTIONS: &[Info] = &[
+    with(
+        Icon::Open,
+        entry(Action::Open, File, 0, "Open…", key(CTRL, Key::O), "Open an IGES file or a Patchwright project"),
+    ),
+    entry(Action::OpenExample, File, 0, "Open example…", None, "Open one of the bundled example models"),
+    with(
+        Icon::Save,
+        entry(Action::Save, File, 1, "Save", key(CTRL, Key::S), "Write the model and its patches back to its file"),
+    ),
+    entry(
+        Action::SaveAs,
+        File,
+        1,
+        "Save as…",
+        key(CTRL_SHIFT, Key::S),
+        "Write to another file: a project (.ron) or IGES (.igs)",
+    ),
+    entry(
+        Action::SaveSpec,
+        File,
+        1,
+        "Save patch specification…",
+        None,
+        "Write the picked sides of all patches as RON, which the command line heals again",
+    ),
+    entry(
+        Action::Quit,
+        File,
+        9,
+        "Quit",
+        key(CTRL, Key::Q),
+        "Close the window; asks first when there are unsaved changes",
+    ),
+    with(Icon::Undo, entry(Action::Undo, Edit, 0, "Undo", key(CTRL, Key::Z), "Take the last change back")),
+    with(Icon::Redo, entry(Action::Redo, Edit, 0, "Redo", key(CTRL_SHIFT, Key::Z), "Bring back what undo took")),
+    entry(Action::SelectAll, Edit, 1, "Select all", key(CTRL, Key::A), "Select everything that is visible"),
+    entry(Action::Deselect, Edit, 1, "Deselect", key(CTRL_SHIFT, Key::A), "Select nothing"),
+    entry(Action::Rename, Edit, 2, "Rename…", key(NONE, Key::F2), "Give the selected entity another name"),
+    with(
+        Icon::Trash,
+        entry(Action::Delete, Edit, 2, "Delete", key(NONE, Key::Delete), "Remove what is selected from the model"),
+    ),
+    entry(Action::Settings, Edit, 3, "Settings…", key(CTRL, Key::Comma), "Navigation, theme and tolerances"),
+    with(
+        Icon::FrameAll,
+        entry(Action::FrameAll, View, 0, "Frame all", key(NONE, Key::Home), "Fit the whole model into the view"),
+    ),
+    with(
+        Icon::FrameSelection,
+        entry(
+            Action::FrameSelection,
+            View,
+            0,
+            "Frame selection",
+            key(NONE, Key::F),
+            "Fit what is selected into the view",
+        ),
+    ),
+    entry(Action::Front, View, 1, "Front view", key(NONE, Key::Num1), "Look along +y"),
+    entry(Action::Back, View, 1, "Back view", key(CTRL, Key::Num1), "Look along -y"),
+    entry(Action::Right, View, 1, "Right view", key(NONE, Key::Num3), "Look along -x"),
+    entry(Action::Left, View, 1, "Left view", key(CTRL, Key::Num3), "Look along +x"),
+    entry(Action::Top, View, 1, "Top view", key(NONE, Key::Num7), "Look along -z"),
+    entry(Action::Bottom, View, 1, "Bottom view", key(CTRL, Key::Num7), "Look along +z"),
+    with(
+        Icon::Projection,
+        entry(
+            Action::Perspective,
+            View,
+            1,
+            "Perspective",
+            key(NONE, Key::Num5),
+            "Switch between perspective and parallel projection",
+        ),
+    ),
+    with(Icon::Shaded, entry(Action::Shaded, View, 2, "Shaded", key(ALT, Key::Num1), "Fill the surfaces")),
+    with(
+        Icon::Wireframe,
+        entry(Action::Wireframe, View, 2, "Wireframe", key(ALT, Key::Num2), "Draw the triangles' edges only"),
+    ),
+    with(Icon::Xray, entry(Action::Xray, View, 2, "X-ray", key(ALT, Key::Num3), "Let what is behind shine through")),
+    with(Icon::Edges, entry(Action::Edges, View, 3, "Edges", key(ALT, Key::E), "Draw the edges of the surfaces")),
+    with(Icon::Iso, entry(Action::IsoLines, View, 3, "Iso-lines", key(ALT, Key::I), "Draw lines of constant u and v")),
+    with(
+        Icon::Section,
+        entry(
+            Action::Section,
+            View,
+            3,
+            "Section plane",
+            key(ALT, Key::S),
+            "Cut the view open along a plane; drag its handle",
+        ),
+    ),
+    with(Icon::EyeOff, entry(Action::Hide, View, 4, "Hide", key(NONE, Key::H), "Hide what is selected")),
+    with(Icon::Isolate, entry(Action::Isolate, View, 4, "Isolate", key(SHIFT, Key::H), "Hide everything else")),
+    with(Icon::Eye, entry(Action::ShowAll, View, 4, "Show all", key(ALT, Key::H), "Show every entity again")),
+    entry(Action::LightTheme, View, 5, "Light theme", None, "Dark text on a light window"),
+    entry(Action::DarkTheme, View, 5, "Dark theme", None, "Light text on a dark window"),
+    entry(Action::LeftPanel, View, 6, "Outliner and properties", key(NONE, Key::F9), "Show or hide the left panel"),
+    entry(Action::RightPanel, View, 6, "Tool panel", key(NONE, Key::F10), "Show or hide the right panel"),
+    entry(Action::ShowTool, View, 7, "Show tool", None, "Bring the tool's page to the front"),
+    entry(Action::ShowPatches, View, 7, "Show patches", None, "Bring the table of patches to the front"),
+    entry(Action::ShowHistory, View, 7, "Show history", None, "Bring the list of changes to the front"),
+    entry(Action::ShowJobs, View, 7, "Show jobs", None, "Bring the list of computations to the front"),
+    entry(Action::ShowReport, View, 7, "Show import report", None, "Bring the account of the last file to the front"),
+    with(Icon::Select, entry(Action::SelectTool, Heal, 0, "Select", key(NONE, Key::Q), "Pick entities in the view")),
+    entry(
+        Action::CancelJobs,
+        Heal,
+        1,
+        "Cancel all jobs",
+        key(SHIFT, Key::Escape),
+        "Ask every running computation to stop",
+    ),
+    with(
+        Icon::Search,
+        entry(Action::Palette, Help, 0, "Find command…", key(CTRL, Key::K), "Search all commands by name"),
+    ),
+    entry(Action::Keys, Help, 0, "Keys and mouse", key(NONE, Key::F1), "List every key and what the mouse does"),
+    entry(Action::About, Help, 1, "About Patchwright", None, "Version and licence"),
+];
+
+/// What is known of `action`.
+pub fn info(action: Action) -> &'static Info {
+    // Every action has an entry (tested), so the fallback is never shown.
+    ACTIONS.iter().find(|i| i.action == action).unwrap_or(&ACTIONS[0])
+}
+
+/// The toolbar, in groups.
+pub const TOOLBAR: &[&[Action]] = &[
+    &[Action::Open, Action::Save],
+    &[Action::Undo, Action::Redo],
+    &[Action::SelectTool],
+    &[Action::FrameAll, Action::FrameSelection, Action::Perspective],
+    &[Action::Shaded, Action::Wireframe, Action::Xray],
+    &[Action::Edges, Action::IsoLines, Action::Section],
+    &[Action::Hide, Action::Isolate, Action::ShowAll],
+];
+
+/// How well `query` fits `text`: every letter must come in order; letters at the start of words and in a row
+/// weigh more. `None` when it does not fit.
+pub fn fuzzy(query: &str, text: &str) -> Option<i32> {
+    let text: Vec<char> = text.to_lowercase().chars().collect();
+    let (mut at, mut score, mut last) = (0, 0, usize::MAX);
+    for c in query.to_lowercase().chars().filter(|c| !c.is_whitespace()) {
+        // Prefer the start of a word, then whatever comes first.
+        let word = (at..text.len()).find(|&i| text[i] == c && (i == 0 || !text[i - 1].is_alphanumeric()));
+        let next = (at..text.len()).find(|&i| text[i] == c)?;
+        let found = if last != usize::MAX && next == last + 1 { next } else { word.unwrap_or(next) };
+        score += if last != usize::MAX && found == last + 1 { 8 } else { 0 };
+        score += if found == 0 || !text[found - 1].is_alphanumeric() { 6 } else { 1 };
+        (at, last) = (found + 1, found);
+    }
+    Some(score * 100 - text.len() as i32)
+}
+
+/// The actions that fit `query`, best first; all of them, in menu order, for an empty one.
+pub fn matching(query: &str) -> Vec<&'static Info> {
+    let mut found: Vec<(i32, &Info)> = ACTIONS
+        .iter()
+        .filter_map(|info| {
+            let name = fuzzy(query, info.name);
+            let help = fuzzy(query, info.help).filter(|_| query.len() > 3).map(|s| s / 3 - 1000);
+            name.max(help).map(|score| (score, info))
+        })
+        .collect();
+    if !query.trim().is_empty() {
+        found.sort_by_key(|(score, _)| std::cmp::Reverse(*score));
+    }
+    found.into_iter().map(|(_, info)| info).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn names_and_keys_are_unique_and_follow_the_rules() {
+        let mut names = HashSet::new();
+        let mut keys = HashSet::new();
+        for info in ACTIONS {
+            assert!(names.insert(info.name), "{} twice", info.name);
+            assert!(info.name.starts_with(char::is_uppercase) && !info.name.ends_with(['.', ':']), "{}", info.name);
+            assert!(!info.name.contains("..."), "{}", info.name);
+            assert!(!info.help.is_empty() && !info.help.ends_with('.'), "{}", info.help);
+            if let Some(shortcut) = info.shortcut {
+                assert!(keys.insert(shortcut), "{shortcut:?} twice");
+            }
+            assert_eq!(super::info(info.action).name, info.name);
+        }
+        assert!(TOOLBAR.iter().flat_map(|g| g.iter()).all(|&a| info(a).icon.is_some()));
+    }
+
+    #[test]
+    fn the_palette_finds_by_initials_and_by_parts() {
+        assert_eq!(matching("fa")[0].action, Action::FrameAll);
+        assert_eq!(matching("iso")[0].action, Action::IsoLines);
+        assert_eq!(matching("undo")[0].action, Action::Undo);
+        assert_eq!(matching("quit")[0].action, Action::Quit);
+        assert!(matching("zzzz").is_empty());
+        assert_eq!(matching("").len(), ACTIONS.len());
+    }
+}

@@ -1,0 +1,301 @@
+//! The application: what is laid out where, and what happens each frame.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use egui::{CentralPanel, Frame, Key, Margin, Modifiers, Panel, Ui};
+
+use super::actions::{ACTIONS, Action};
+use super::autosave::Autosave;
+use super::dialogs::{Answer, Dialog, Then};
+use super::editor::{Editor, Page};
+use super::files::Files;
+use super::hints::{self, Hints};
+use super::palette;
+use super::settings::Settings;
+use super::tools::Tool;
+use super::viewport::Viewport;
+use super::{bars, panels, status, theme};
+use crate::io::autosave::Journal;
+use crate::model::command::Command;
+use crate::model::history::History;
+use crate::model::selection::Selection;
+use crate::work::Jobs;
+
+/// How the editor starts.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// The files to open; the bundled example when there are none.
+    pub files: Vec<PathBuf>,
+    /// Where settings are kept between sessions; nowhere when left out.
+    pub settings: Option<PathBuf>,
+    /// Where changes are put aside for recovery; nowhere when left out.
+    pub journal: Option<Journal>,
+    /// Where positions of buttons and curves are written for scripts.
+    pub hints: Option<PathBuf>,
+}
+
+impl Options {
+    /// What a user's session starts with.
+    pub fn of_user(files: Vec<PathBuf>) -> Self {
+        let hints = std::env::var_os("PATCHWRIGHT_SCRIPT_HINTS").map(PathBuf::from);
+        Self { files, settings: Settings::path(), journal: Journal::of_user(), hints }
+    }
+}
+
+/// Opens the window and stays until it is closed.
+///
+/// # Errors
+/// The reason in one line when no window or no graphics adapter is to be had.
+pub fn run(files: Vec<PathBuf>) -> Result<(), String> {
+    let options = Options::of_user(files);
+    let native = eframe::NativeOptions {
+        viewport: egui::ViewportBuilder::default()
+            .with_title("Patchwright")
+            .with_app_id("patchwright")
+            .with_inner_size([1400.0, 900.0])
+            .with_min_inner_size([900.0, 600.0])
+            .with_drag_and_drop(true),
+        // The 3D view writes exact colours; dithering would only add noise to screenshots.
+        dithering: false,
+        ..eframe::NativeOptions::default()
+    };
+    eframe::run_native("Patchwright", native, Box::new(|cc| Ok(Box::new(App::new(cc, options)))))
+        .map_err(|error| format!("no window could be opened: {error}"))
+}
+
+/// The application.
+pub struct App {
+    /// Everything but the drawing.
+    pub editor: Editor,
+    hints: Option<Arc<Mutex<hints::State>>>,
+}
+
+impl App {
+    /// An editor in `cc`'s window.
+    pub fn new(cc: &eframe::CreationContext<'_>, options: Options) -> Self {
+        let ctx = &cc.egui_ctx;
+        theme::install(ctx);
+        let settings = options.settings.as_deref().map(Settings::load).unwrap_or_default();
+        let wake = ctx.clone();
+        let mut editor = Editor {
+            history: History::new(crate::model::document::Document::default(), true),
+            selection: Selection::default(),
+            files: Files::default(),
+            jobs: Jobs::new(move || wake.request_repaint()),
+            settings,
+            settings_path: options.settings,
+            viewport: Viewport::new(cc.wgpu_render_state.as_ref()),
+            tool: Tool::Select,
+            page: Page::Tool,
+            dialog: None,
+            palette: None,
+            note: None,
+            filter: String::new(),
+            checking: None,
+            may_close: false,
+            recoveries: Vec::new(),
+            autosave: options.journal.as_ref().map(Autosave::start).unwrap_or_default(),
+        };
+        editor.apply_settings(ctx);
+        if options.files.is_empty() {
+            editor.open_first_example();
+        } else {
+            editor.open_now(options.files);
+        }
+        if let Some(journal) = &options.journal {
+            editor.offer_recovery(journal.recoverable());
+        }
+        Self { editor, hints: options.hints.map(|path| Hints::install(ctx, path)) }
+    }
+
+    /// Shortcuts of the active tool first, then those of the actions.
+    fn keys(&mut self, ctx: &egui::Context) {
+        if self.editor.dialog.is_some() || self.editor.palette.is_some() {
+            return;
+        }
+        let typing = ctx.text_edit_focused();
+        if !typing {
+            self.editor.tool_keys(ctx);
+        }
+        let mut chosen = Vec::new();
+        ctx.input_mut(|input| {
+            for info in ACTIONS {
+                let Some(shortcut) = info.shortcut else { continue };
+                let function_key = matches!(shortcut.logical_key, Key::F1 | Key::F9 | Key::F10);
+                if typing && !function_key && (shortcut.modifiers.is_none() || shortcut.conflicts_with_text_editing()) {
+                    continue;
+                }
+                let text_editing = [Action::SelectAll, Action::Undo, Action::Redo, Action::Deselect];
+                if typing && text_editing.contains(&info.action) {
+                    continue;
+                }
+                if take_key(input, shortcut.modifiers, shortcut.logical_key) {
+                    chosen.push(info.action);
+                }
+            }
+            if !typing && take_key(input, Modifiers::COMMAND, Key::Y) {
+                chosen.push(Action::Redo);
+            }
+        });
+        for action in chosen {
+            self.editor.perform(ctx, action);
+        }
+        if !typing && ctx.input_mut(|i| take_key(i, Modifiers::NONE, Key::Escape)) {
+            self.editor.escape();
+        }
+    }
+
+    fn dialogs(&mut self, ctx: &egui::Context) {
+        let editor = &mut self.editor;
+        if let Some(mut palette) = editor.palette.take() {
+            match palette.show(ctx, |action| editor.enabled(action)) {
+                palette::Answer::Open => editor.palette = Some(palette),
+                palette::Answer::Dismissed => {}
+                palette::Answer::Chosen(action) => editor.perform(ctx, action),
+            }
+        }
+        let Some(mut dialog) = editor.dialog.take() else { return };
+        let answer = dialog.show(ctx, &mut editor.settings, &super::files::examples());
+        match answer {
+            Answer::Stay => editor.dialog = Some(dialog),
+            Answer::SettingsChanged => {
+                editor.apply_settings(ctx);
+                editor.store_settings();
+                editor.dialog = Some(dialog);
+            }
+            Answer::Close => {}
+            Answer::Open(path) => editor.open(vec![path]),
+            Answer::Example(name) => editor.open_example(name),
+            Answer::Save(what, path, then) => editor.save_to(what, path, then),
+            Answer::Overwrite(what, path, then) => editor.dialog = Some(Dialog::Overwrite(what, path, then)),
+            Answer::SaveFirst(then) => editor.save(Some(then)),
+            Answer::Discard(Then::Quit) => editor.close(ctx),
+            Answer::Discard(Then::Open(paths)) => editor.open_now(paths),
+            Answer::Discard(Then::Example(name)) => editor.open_example_now(name),
+            Answer::Rename(id, name) => {
+                editor.command(&Command::Rename { id, name });
+            }
+            Answer::Do(action) => editor.perform(ctx, action),
+            Answer::Recover(at) => editor.recover(at),
+            Answer::Forget(at) => editor.forget(at),
+        }
+    }
+}
+
+/// Takes a key press with exactly these modifiers out of the input.
+pub fn take_key(input: &mut egui::InputState, modifiers: Modifiers, key: Key) -> bool {
+    let mut taken = false;
+    input.events.retain(|event| {
+        let hit = matches!(event, egui::Event::Key { key: k, modifiers: m, pressed: true, .. }
+            if *k == key && m.shift == modifiers.shift && m.alt == modifiers.alt
+                && (m.command || m.ctrl) == (modifiers.command || modifiers.ctrl));
+        taken |= hit;
+        !hit
+    });
+    taken
+}
+
+impl eframe::App for App {
+    fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        self.editor.poll_files(ctx);
+        self.editor.poll_tool(ctx);
+        self.editor.poll_autosave();
+        if ctx.input(|i| i.viewport().close_requested()) && !self.editor.may_close {
+            let dirty = self.editor.history.is_dirty() && !self.editor.document().entities().is_empty();
+            if dirty {
+                ctx.send_viewport_cmd(egui::ViewportCommand::CancelClose);
+                self.editor.dialog = Some(Dialog::Unsaved(Then::Quit));
+            } else {
+                self.editor.jobs.cancel_all();
+            }
+        }
+    }
+
+    fn on_exit(&mut self) {
+        self.editor.autosave.end();
+    }
+
+    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        let start = Instant::now();
+        let ctx = ui.ctx().clone();
+        let dropped: Vec<PathBuf> = ctx.input(|i| {
+            i.raw.dropped_files.iter().map(|f| f.path().to_path_buf()).filter(|p| !p.as_os_str().is_empty()).collect()
+        });
+        if !dropped.is_empty() {
+            self.editor.open(dropped);
+        }
+        self.keys(&ctx);
+
+        let t = theme::of(ui);
+        let bar = Frame::new().fill(t.panel).inner_margin(Margin::symmetric(8, 3));
+        Panel::top("menu").frame(bar).show_separator_line(false).show(ui, |ui| bars::menu(ui, &mut self.editor));
+        Panel::top("toolbar").frame(bar).show(ui, |ui| bars::toolbar(ui, &mut self.editor));
+        Panel::bottom("status")
+            .exact_size(theme::STATUS_HEIGHT)
+            .frame(Frame::new().fill(t.panel).inner_margin(Margin::symmetric(10, 0)))
+            .show(ui, |ui| status::show(ui, &mut self.editor));
+        let side = Frame::new().fill(t.panel).inner_margin(Margin::same(0));
+        if self.editor.settings.left_panel {
+            Panel::left("left")
+                .frame(side)
+                .default_size(250.0)
+                .size_range(180.0..=420.0)
+                .show(ui, |ui| panels::left(ui, &mut self.editor));
+        }
+        if self.editor.settings.right_panel {
+            Panel::right("right")
+                .frame(side)
+                .default_size(340.0)
+                .size_range(290.0..=520.0)
+                .show(ui, |ui| panels::right(ui, &mut self.editor));
+        }
+        CentralPanel::default().frame(Frame::NONE).show(ui, |ui| self.editor.show_viewport(ui));
+
+        self.dialogs(&ctx);
+        self.title(&ctx);
+        if !self.editor.jobs.active().is_empty() {
+            // Progress moves although nobody touches the mouse.
+            ctx.request_repaint_after(Duration::from_millis(60));
+        }
+        self.hint(&ctx);
+        self.editor.viewport.note_frame_time(start.elapsed());
+    }
+}
+
+impl App {
+    /// Tells scripts where things are.
+    fn hint(&mut self, ctx: &egui::Context) {
+        let Some(slot) = &self.hints else { return };
+        let editor = &self.editor;
+        let (tool, prompt, _) = editor.prompt();
+        let state = hints::State {
+            busy: !editor.jobs.active().is_empty() || editor.viewport.is_moving(),
+            page: format!("{:?}", editor.page),
+            dialog: editor.dialog.as_ref().map_or("", Dialog::name).to_owned(),
+            prompt: format!("{tool} · {prompt}"),
+            entities: editor.document().entities().len(),
+            patches: editor.document().patches().count(),
+            dirty: editor.history.is_dirty(),
+            title: editor.files.title.clone(),
+            curves: editor.curve_hints(ctx.pixels_per_point()),
+            ..hints::State::default()
+        };
+        *slot.lock().unwrap_or_else(PoisonError::into_inner) = state;
+    }
+
+    fn title(&self, ctx: &egui::Context) {
+        let editor = &self.editor;
+        let dirty = if editor.history.is_dirty() { "*" } else { "" };
+        let title = match editor.files.title.as_str() {
+            "" => "Patchwright".to_owned(),
+            name => format!("{name}{dirty} - Patchwright"),
+        };
+        let id = egui::Id::unique("window title");
+        if ctx.data(|d| d.get_temp::<String>(id)).as_deref() != Some(&title) {
+            ctx.data_mut(|d| d.insert_temp(id, title.clone()));
+            ctx.send_viewport_cmd(egui::ViewportCommand::Title(title));
+        }
+    }
+}

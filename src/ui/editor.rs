@@ -1,0 +1,356 @@
+//! The state of the editor and what each action does to it. No drawing here.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use super::actions::Action;
+use super::autosave::Autosave;
+use super::dialogs::{Dialog, PathField, Problem, SaveWhat, Then};
+use super::files::Files;
+use super::palette::Palette;
+use super::settings::{Settings, Theme};
+use super::tools::Tool;
+use super::viewport::Viewport;
+use crate::io::autosave::Recovery;
+use crate::model::command::Command;
+use crate::model::document::{Document, EntityId};
+use crate::model::history::History;
+use crate::model::selection::Selection;
+use crate::view::camera::{Axis, Projection};
+use crate::work::Jobs;
+
+/// The pages of the right panel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Page {
+    /// The active tool.
+    #[default]
+    Tool,
+    /// The table of patches.
+    Patches,
+    /// The list of changes.
+    History,
+    /// The list of computations.
+    Jobs,
+    /// What happened to the last file.
+    Report,
+}
+
+impl Page {
+    /// All pages with their titles.
+    pub const ALL: [(Self, &'static str); 5] = [
+        (Self::Tool, "Tool"),
+        (Self::Patches, "Patches"),
+        (Self::History, "History"),
+        (Self::Jobs, "Jobs"),
+        (Self::Report, "Report"),
+    ];
+}
+
+/// A message in the status line that goes away by itself.
+#[derive(Clone, Debug)]
+pub struct Note {
+    /// What it says.
+    pub text: String,
+    /// Whether it needs a look.
+    pub warning: bool,
+    /// When it came.
+    pub since: Instant,
+}
+
+/// The editor.
+pub struct Editor {
+    /// The document and its past.
+    pub history: History,
+    /// What is selected.
+    pub selection: Selection,
+    /// Where the document came from and goes to.
+    pub files: Files,
+    /// The workers.
+    pub jobs: Jobs,
+    /// What is remembered between sessions.
+    pub settings: Settings,
+    /// Where that is kept.
+    pub settings_path: Option<PathBuf>,
+    /// The 3D view.
+    pub viewport: Viewport,
+    /// The active tool.
+    pub tool: Tool,
+    /// The page of the right panel.
+    pub page: Page,
+    /// The dialog in front of everything.
+    pub dialog: Option<Dialog>,
+    /// The command palette.
+    pub palette: Option<Palette>,
+    /// The last message.
+    pub note: Option<Note>,
+    /// The text that the outliner is searched for.
+    pub filter: String,
+    /// A patch passes when its largest error is within this; by the model's size when not set.
+    pub checking: Option<f64>,
+    /// What crashed sessions left behind.
+    pub recoveries: Vec<Recovery>,
+    /// Puts changes aside.
+    pub autosave: Autosave,
+    /// Set when the window may close.
+    pub may_close: bool,
+}
+
+impl Editor {
+    /// The current document.
+    pub fn document(&self) -> &Document {
+        self.history.document()
+    }
+
+    /// Shows a message in the status line.
+    pub fn say(&mut self, text: impl Into<String>) {
+        self.note = Some(Note { text: text.into(), warning: false, since: Instant::now() });
+    }
+
+    /// Shows a message that needs a look in the status line.
+    pub fn warn(&mut self, text: impl Into<String>) {
+        self.note = Some(Note { text: text.into(), warning: true, since: Instant::now() });
+    }
+
+    /// Shows a problem in front of everything; an open dialog gives way.
+    pub fn problem(&mut self, problem: Problem) {
+        log::warn!("{}: {}", problem.what, problem.why);
+        self.dialog = Some(Dialog::Problem(problem));
+    }
+
+    /// Applies a command to the document, or says why it could not be.
+    pub fn command(&mut self, command: &Command) -> bool {
+        match self.history.apply(command) {
+            Ok(()) => {
+                self.selection.prune(self.history.document());
+                true
+            }
+            Err(error) => {
+                self.problem(Problem {
+                    what: format!("{} did not work", command.label()),
+                    why: error.to_string(),
+                    ..Problem::default()
+                });
+                false
+            }
+        }
+    }
+
+    /// Keeps the settings; a failure is only worth a note.
+    pub fn store_settings(&mut self) {
+        if let Some(path) = &self.settings_path
+            && let Err(error) = self.settings.store(path)
+        {
+            let text = format!("The settings could not be kept in {}: {error}", path.display());
+            self.warn(text);
+        }
+    }
+
+    /// Whether an action can be done now, or why not.
+    pub fn enabled(&self, action: Action) -> Result<(), &'static str> {
+        let need = |ok: bool, why: &'static str| if ok { Ok(()) } else { Err(why) };
+        let selected = !self.selection.is_empty();
+        match action {
+            Action::Undo => need(self.history.undo_label().is_some(), "nothing to undo"),
+            Action::Redo => need(self.history.redo_label().is_some(), "nothing to redo"),
+            Action::Save | Action::SaveAs => need(!self.document().entities().is_empty(), "the model is empty"),
+            Action::SaveSpec => need(self.document().patches().next().is_some(), "there are no patches yet"),
+            Action::Delete | Action::Hide | Action::Isolate | Action::Deselect => need(selected, "nothing is selected"),
+            Action::Rename => need(self.selection.ids().len() == 1, "select one entity"),
+            Action::SelectAll => need(self.document().entities().iter().any(|e| e.visible), "nothing is visible"),
+            Action::ShowAll => need(self.document().entities().iter().any(|e| !e.visible), "everything is visible"),
+            Action::FrameAll => need(!self.document().entities().is_empty(), "the model is empty"),
+            Action::FrameSelection => need(selected, "nothing is selected"),
+            Action::CancelJobs => need(!self.jobs.active().is_empty(), "nothing is running"),
+            Action::ShowReport => need(self.files.report.is_some(), "no file has been opened"),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether a switch is on; `None` for what is no switch.
+    pub fn checked(&self, action: Action) -> Option<bool> {
+        let display = &self.viewport.display;
+        Some(match action {
+            Action::Perspective => self.viewport.camera.projection == Projection::Perspective,
+            Action::Shaded => display.shaded && !display.wireframe && !display.xray,
+            Action::Wireframe => display.wireframe,
+            Action::Xray => display.xray,
+            Action::Edges => display.edges,
+            Action::IsoLines => display.isolines,
+            Action::Section => self.viewport.section.is_some(),
+            Action::LightTheme => self.settings.theme == Theme::Light,
+            Action::DarkTheme => self.settings.theme == Theme::Dark,
+            Action::LeftPanel => self.settings.left_panel,
+            Action::RightPanel => self.settings.right_panel,
+            Action::SelectTool => matches!(self.tool, Tool::Select),
+            _ => return None,
+        })
+    }
+
+    /// Does an action. What cannot be done now says so in the status line.
+    pub fn perform(&mut self, ctx: &egui::Context, action: Action) {
+        if let Err(why) = self.enabled(action) {
+            let name = super::actions::info(action).name.trim_end_matches('…');
+            self.warn(format!("{name}: {why}"));
+            return;
+        }
+        let ids = || self.selection.ids().to_vec();
+        match action {
+            Action::Open => self.dialog = Some(Dialog::Open(PathField::default())),
+            Action::OpenExample => self.dialog = Some(Dialog::Examples),
+            Action::Save => self.save(None),
+            Action::SaveAs => self.ask_where(SaveWhat::Model, None),
+            Action::SaveSpec => self.ask_where(SaveWhat::Spec, None),
+            Action::Quit => self.quit(ctx),
+            Action::Undo => {
+                if let Some(label) = self.history.undo().map(str::to_owned) {
+                    self.say(format!("Undone: {label}"));
+                }
+                self.selection.prune(self.history.document());
+            }
+            Action::Redo => {
+                if let Some(label) = self.history.redo().map(str::to_owned) {
+                    self.say(format!("Redone: {label}"));
+                }
+                self.selection.prune(self.history.document());
+            }
+            Action::SelectAll => {
+                let visible: Vec<EntityId> =
+                    self.document().entities().iter().filter(|e| e.visible).map(|e| e.id).collect();
+                self.selection.set(visible);
+            }
+            Action::Deselect => self.selection.clear(),
+            Action::Rename => {
+                let id = self.selection.ids().first().copied();
+                if let Some(entity) = id.and_then(|id| self.document().get(id)) {
+                    self.dialog = Some(Dialog::Rename(entity.id, entity.name.clone()));
+                }
+            }
+            Action::Delete => {
+                let ids = ids();
+                self.command(&Command::Delete { ids });
+            }
+            Action::Settings => self.dialog = Some(Dialog::Settings),
+            Action::Hide => {
+                let ids = ids();
+                if self.command(&Command::SetVisible { ids, visible: false }) {
+                    self.selection.clear();
+                }
+            }
+            Action::Isolate => {
+                let ids = ids();
+                self.command(&Command::Isolate { ids });
+            }
+            Action::ShowAll => {
+                self.command(&Command::ShowAll);
+            }
+            Action::FrameAll => self.viewport.frame(&visible_bounds(self.history.document())),
+            Action::FrameSelection => {
+                let document = self.history.document();
+                let bounds = self.selection.ids().iter().filter_map(|&id| document.get(id));
+                let bounds = bounds.fold(crate::kernel::geom::Aabb::EMPTY, |all, e| all.union(&e.bounds()));
+                self.viewport.frame(&bounds);
+            }
+            Action::Front => self.viewport.look(Axis::Front),
+            Action::Back => self.viewport.look(Axis::Back),
+            Action::Right => self.viewport.look(Axis::Right),
+            Action::Left => self.viewport.look(Axis::Left),
+            Action::Top => self.viewport.look(Axis::Top),
+            Action::Bottom => self.viewport.look(Axis::Bottom),
+            Action::Perspective => self.viewport.toggle_projection(),
+            Action::Shaded => {
+                let display = &mut self.viewport.display;
+                (display.shaded, display.wireframe, display.xray) = (true, false, false);
+            }
+            Action::Wireframe => {
+                let display = &mut self.viewport.display;
+                let on = !display.wireframe;
+                (display.shaded, display.wireframe, display.xray) = (!on, on, false);
+            }
+            Action::Xray => {
+                let display = &mut self.viewport.display;
+                let on = !display.xray;
+                (display.shaded, display.wireframe, display.xray) = (true, false, on);
+            }
+            Action::Edges => self.viewport.display.edges ^= true,
+            Action::IsoLines => self.viewport.display.isolines ^= true,
+            Action::Section => self.viewport.toggle_section(&visible_bounds(self.history.document())),
+            Action::LightTheme => self.set_theme(ctx, Theme::Light),
+            Action::DarkTheme => self.set_theme(ctx, Theme::Dark),
+            Action::LeftPanel => {
+                self.settings.left_panel ^= true;
+                self.store_settings();
+            }
+            Action::RightPanel => {
+                self.settings.right_panel ^= true;
+                self.store_settings();
+            }
+            Action::ShowTool => self.show_page(Page::Tool),
+            Action::ShowPatches => self.show_page(Page::Patches),
+            Action::ShowHistory => self.show_page(Page::History),
+            Action::ShowJobs => self.show_page(Page::Jobs),
+            Action::ShowReport => self.show_page(Page::Report),
+            Action::SelectTool => self.leave_tool(),
+            Action::CancelJobs => {
+                self.jobs.cancel_all();
+                self.say("Asked every job to stop");
+            }
+            Action::Palette => self.palette = Some(Palette::default()),
+            Action::Keys => self.dialog = Some(Dialog::Keys),
+            Action::About => self.dialog = Some(Dialog::About),
+        }
+    }
+
+    /// The tolerance that patches are checked with, in model units.
+    pub fn checking_tolerance(&self) -> f64 {
+        self.checking.unwrap_or(1e-3 * self.document().bounds().diagonal())
+    }
+
+    /// Changes the tolerance that patches are checked with.
+    pub fn set_checking_tolerance(&mut self, value: f64) {
+        self.checking = Some(value);
+    }
+
+    /// Brings a page of the right panel to the front.
+    pub fn show_page(&mut self, page: Page) {
+        self.page = page;
+        self.settings.right_panel = true;
+    }
+
+    /// Changes the theme and keeps it.
+    pub fn set_theme(&mut self, ctx: &egui::Context, theme: Theme) {
+        self.settings.theme = theme;
+        self.apply_settings(ctx);
+        self.store_settings();
+    }
+
+    /// Puts the settings into effect.
+    pub fn apply_settings(&mut self, ctx: &egui::Context) {
+        ctx.set_theme(match self.settings.theme {
+            Theme::Dark => egui::ThemePreference::Dark,
+            Theme::Light => egui::ThemePreference::Light,
+        });
+    }
+
+    /// Closes the window, after asking when there are unsaved changes.
+    pub fn quit(&mut self, ctx: &egui::Context) {
+        if self.history.is_dirty() && !self.document().entities().is_empty() {
+            self.dialog = Some(Dialog::Unsaved(Then::Quit));
+        } else {
+            self.close(ctx);
+        }
+    }
+
+    /// Closes the window.
+    pub fn close(&mut self, ctx: &egui::Context) {
+        self.may_close = true;
+        self.jobs.cancel_all();
+        ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+    }
+}
+
+/// A box around what is visible, or around everything when nothing is.
+pub fn visible_bounds(document: &Document) -> crate::kernel::geom::Aabb {
+    let visible = document.entities().iter().filter(|e| e.visible);
+    let bounds = visible.fold(crate::kernel::geom::Aabb::EMPTY, |all, e| all.union(&e.bounds()));
+    if bounds.is_empty() { document.bounds() } else { bounds }
+}

@@ -1,0 +1,208 @@
+//! What the mouse does in the view: navigation first, then what the active tool may pick.
+
+use egui::{PointerButton, Response, Ui};
+use glam::{DVec2, DVec3};
+
+use super::Viewport;
+use crate::view::camera::Camera;
+use crate::view::navigation::{Button, Drag, Modifiers, Preset, wheel};
+use crate::view::pick::{Filter, PickHit, PickOptions, Target, pick, pick_all, under_cursor};
+
+/// Points of scrolling that count as one notch of the wheel.
+const NOTCH: f32 = 40.0;
+/// Farther than this between press and release, and it was no click.
+const CLICK: f32 = 5.0;
+
+/// What the left button did.
+#[derive(Clone, Debug, Default)]
+pub struct Pointer {
+    /// What is under the cursor.
+    pub hover: Option<PickHit>,
+    /// What was clicked: the hit (none for the empty background) and whether Shift or Ctrl was held.
+    pub click: Option<(Option<PickHit>, Modifiers)>,
+    /// Everything under the cursor, for the list that Alt+click opens.
+    pub list: Option<Vec<PickHit>>,
+    /// The cursor's pixel while it is over the view.
+    pub pixel: Option<DVec2>,
+    /// Pressed here, and not yet released.
+    pub pressed: bool,
+    /// A drag of the left button: where it began and where it is.
+    pub drag: Option<(DVec2, DVec2)>,
+    /// The drag has just begun.
+    pub drag_started: bool,
+    /// The drag has just ended.
+    pub drag_ended: bool,
+}
+
+/// What decides what is under the cursor.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HoverStamp {
+    pixel: DVec2,
+    camera: Camera,
+    scene: u64,
+    filter: Filter,
+    points: usize,
+    tool: u64,
+}
+
+fn held(m: egui::Modifiers) -> Modifiers {
+    Modifiers { shift: m.shift, ctrl: m.command || m.ctrl, alt: m.alt }
+}
+
+impl Viewport {
+    /// How to pick with a filter.
+    fn options<'a>(&self, filter: Filter, points: &'a [DVec3]) -> PickOptions<'a> {
+        let occlusion = !self.display.wireframe && !self.display.xray;
+        PickOptions { filter, occlusion, section: self.section, points }
+    }
+
+    /// Moves the camera and says what the left button did. `points` are those that the tool offers, `stamp` changes
+    /// whenever they do.
+    pub fn pointer(
+        &mut self,
+        ui: &Ui,
+        response: &Response,
+        preset: Preset,
+        filter: Filter,
+        points: &[DVec3],
+        stamp: u64,
+    ) -> Pointer {
+        let mut out = Pointer::default();
+        let (modifiers, scroll, zoom, at) =
+            ui.input(|i| (held(i.modifiers), i.smooth_scroll_delta().y, i.zoom_delta(), i.pointer.latest_pos()));
+        let over = response.contains_pointer() || response.is_pointer_button_down_on();
+        let Some(at) = at.filter(|_| over || self.drag.is_some()) else {
+            if self.drag.is_none() {
+                self.hovered = self.from_list.take();
+                self.cursor_at = None;
+            }
+            return out;
+        };
+        let pixel = self.to_pixel(at);
+        out.pixel = Some(pixel);
+        self.navigate(ui, response, preset, modifiers, pixel);
+        if response.contains_pointer() && self.drag.is_none() {
+            // Ctrl and the wheel arrive as a zoom.
+            let notches = f64::from(scroll / NOTCH) + f64::from(zoom.ln()) * 6.0;
+            if notches != 0.0 {
+                let view = self.view();
+                let under = under_cursor(&self.scene, &view, pixel, self.section);
+                let bounds = self.bounds();
+                self.motion = None;
+                wheel(&mut self.camera, &view, pixel, under, notches, &bounds);
+            }
+        }
+        if self.drag.is_some() || self.motion.is_some() {
+            self.from_list = None;
+            return out;
+        }
+        self.left_button(ui, response, &mut out, at);
+        out.hover = self.hover_at(pixel, filter, points, stamp);
+        self.cursor_at = out.hover.as_ref().map(|hit| (hit.point, self.hit_uv(hit)));
+        self.hovered = out.hover.as_ref().and_then(|hit| hit_entity(hit)).or(self.from_list.take());
+        if out.click.is_some() {
+            let options = self.options(filter, points);
+            let hits = pick_all(&self.scene, &self.view(), pixel, &options);
+            if modifiers.alt {
+                out.click = None;
+                out.list = Some(hits);
+            } else {
+                // What lies hidden is reached by clicking again, never by the first click.
+                let first_hidden = hits.first().is_some_and(|hit| hit.hidden);
+                let chosen = self.cycle.click(pixel, &hits).copied();
+                let chosen = if first_hidden && out.hover.is_none() && filter == Filter::ALL { None } else { chosen };
+                out.click = Some((chosen, modifiers));
+            }
+        }
+        out
+    }
+
+    /// The press, drag and release of the left button.
+    fn left_button(&mut self, ui: &Ui, response: &Response, out: &mut Pointer, at: egui::Pos2) {
+        let (pressed, released, down) =
+            ui.input(|i| (i.pointer.primary_pressed(), i.pointer.primary_released(), i.pointer.primary_down()));
+        if pressed && response.contains_pointer() {
+            self.pressed = Some(at);
+        }
+        let Some(start) = self.pressed else { return };
+        out.pressed = down;
+        let moved = (at - start).length() > CLICK;
+        if moved || self.dragging {
+            out.drag = Some((self.to_pixel(start), self.to_pixel(at)));
+            out.drag_started = !self.dragging;
+            self.dragging = true;
+        }
+        if released {
+            out.drag_ended = self.dragging;
+            if !self.dragging {
+                out.click = Some((None, Modifiers::NONE));
+            }
+            (self.pressed, self.dragging) = (None, false);
+        } else if !down {
+            (self.pressed, self.dragging) = (None, false);
+        }
+    }
+
+    fn navigate(&mut self, ui: &Ui, response: &Response, preset: Preset, modifiers: Modifiers, pixel: DVec2) {
+        const BUTTONS: [(PointerButton, Button); 3] = [
+            (PointerButton::Primary, Button::Left),
+            (PointerButton::Middle, Button::Middle),
+            (PointerButton::Secondary, Button::Right),
+        ];
+        if self.drag.is_none() && response.contains_pointer() {
+            let pressed = BUTTONS.iter().find(|(b, _)| ui.input(|i| i.pointer.button_pressed(*b)));
+            if let Some(action) = pressed.and_then(|(_, button)| preset.drag(*button, modifiers)) {
+                let view = self.view();
+                let under = under_cursor(&self.scene, &view, pixel, self.section);
+                self.drag = Some(Drag::start(&view, action, pixel, under, &self.bounds()));
+                self.motion = None;
+                self.cycle.reset();
+            }
+        }
+        let picture = self.picture();
+        if let Some(drag) = &mut self.drag {
+            drag.moved(&mut self.camera, picture, pixel);
+            let any_down = BUTTONS.iter().any(|(b, _)| ui.input(|i| i.pointer.button_down(*b)));
+            if !any_down {
+                self.drag = None;
+            }
+        }
+    }
+
+    /// What is under a pixel, looked for only when something has changed.
+    fn hover_at(&mut self, pixel: DVec2, filter: Filter, points: &[DVec3], tool: u64) -> Option<PickHit> {
+        let stamp =
+            HoverStamp { pixel, camera: self.camera, scene: self.scene_stamp, filter, points: points.len(), tool };
+        if let Some((old, hit)) = &self.hover
+            && *old == stamp
+        {
+            return *hit;
+        }
+        let hit = pick(&self.scene, &self.view(), pixel, &self.options(filter, points));
+        self.hover = Some((stamp, hit));
+        hit
+    }
+
+    /// The surface parameters of a hit.
+    fn hit_uv(&self, hit: &PickHit) -> Option<DVec2> {
+        match hit.target {
+            Target::Surface { uv, .. } => Some(uv),
+            Target::Curve { curve, t } => self.scene.curve_item(&curve)?.geometry.curve_uv(&curve, t),
+            Target::Point(_) => None,
+        }
+    }
+
+    /// The point that the camera turns about or holds, while it does.
+    pub fn drag_anchor(&self) -> Option<DVec3> {
+        self.drag.as_ref().map(Drag::anchor)
+    }
+}
+
+/// The entity that was hit.
+pub fn hit_entity(hit: &PickHit) -> Option<crate::model::document::EntityId> {
+    match hit.target {
+        Target::Surface { entity, .. } => Some(entity),
+        Target::Curve { curve, .. } => Some(curve.entity()),
+        Target::Point(_) => None,
+    }
+}
