@@ -50,6 +50,7 @@ pub enum Action {
     ShowJobs,
     ShowReport,
     SelectTool,
+    PatchTool,
     CancelJobs,
     Palette,
     Keys,
@@ -238,6 +239,17 @@ pub const ACTIONS: &[Info] = &[
     entry(Action::ShowJobs, View, 7, "Show jobs", None, "Bring the list of computations to the front"),
     entry(Action::ShowReport, View, 7, "Show import report", None, "Bring the account of the last file to the front"),
     with(Icon::Select, entry(Action::SelectTool, Heal, 0, "Select", key(NONE, Key::Q), "Pick entities in the view")),
+    with(
+        Icon::Patch,
+        entry(
+            Action::PatchTool,
+            Heal,
+            0,
+            "New patch",
+            key(NONE, Key::P),
+            "Pick four sides and lay a patch over what is broken between them",
+        ),
+    ),
     entry(
         Action::CancelJobs,
         Heal,
@@ -264,7 +276,7 @@ pub fn info(action: Action) -> &'static Info {
 pub const TOOLBAR: &[&[Action]] = &[
     &[Action::Open, Action::Save],
     &[Action::Undo, Action::Redo],
-    &[Action::SelectTool],
+    &[Action::SelectTool, Action::PatchTool],
     &[Action::FrameAll, Action::FrameSelection, Action::Perspective],
     &[Action::Shaded, Action::Wireframe, Action::Xray],
     &[Action::Edges, Action::IsoLines, Action::Section],
@@ -329,6 +341,7 @@ mod tests {
     #[test]
     fn the_palette_finds_by_initials_and_by_parts() {
         assert_eq!(matching("fa")[0].action, Action::FrameAll);
+        assert_eq!(matching("np")[0].action, Action::PatchTool);
         assert_eq!(matching("iso")[0].action, Action::IsoLines);
         assert_eq!(matching("undo")[0].action, Action::Undo);
         assert_eq!(matching("quit")[0].action, Action::Quit);

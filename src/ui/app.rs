@@ -88,6 +88,7 @@ impl App {
             settings_path: options.settings,
             viewport: Viewport::new(cc.wgpu_render_state.as_ref()),
             tool: Tool::Select,
+            pick_list: None,
             page: Page::Tool,
             dialog: None,
             palette: None,
@@ -200,7 +201,7 @@ pub fn take_key(input: &mut egui::InputState, modifiers: Modifiers, key: Key) ->
 impl eframe::App for App {
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
         self.editor.poll_files(ctx);
-        self.editor.poll_tool(ctx);
+        self.editor.poll_tool();
         self.editor.poll_autosave();
         if ctx.input(|i| i.viewport().close_requested()) && !self.editor.may_close {
             let dirty = self.editor.history.is_dirty() && !self.editor.document().entities().is_empty();

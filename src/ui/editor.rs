@@ -9,7 +9,7 @@ use super::dialogs::{Dialog, PathField, Problem, SaveWhat, Then};
 use super::files::Files;
 use super::palette::Palette;
 use super::settings::{Settings, Theme};
-use super::tools::Tool;
+use super::tools::{PickList, Tool};
 use super::viewport::Viewport;
 use crate::io::autosave::Recovery;
 use crate::model::command::Command;
@@ -75,6 +75,8 @@ pub struct Editor {
     pub viewport: Viewport,
     /// The active tool.
     pub tool: Tool,
+    /// The list of everything under the cursor, when it is open.
+    pub pick_list: Option<PickList>,
     /// The page of the right panel.
     pub page: Page,
     /// The dialog in front of everything.
@@ -158,6 +160,7 @@ impl Editor {
             Action::Rename => need(self.selection.ids().len() == 1, "select one entity"),
             Action::SelectAll => need(self.document().entities().iter().any(|e| e.visible), "nothing is visible"),
             Action::ShowAll => need(self.document().entities().iter().any(|e| !e.visible), "everything is visible"),
+            Action::PatchTool => need(self.document().surfaces().next().is_some(), "there is no surface to heal"),
             Action::FrameAll => need(!self.document().entities().is_empty(), "the model is empty"),
             Action::FrameSelection => need(selected, "nothing is selected"),
             Action::CancelJobs => need(!self.jobs.active().is_empty(), "nothing is running"),
@@ -182,6 +185,7 @@ impl Editor {
             Action::LeftPanel => self.settings.left_panel,
             Action::RightPanel => self.settings.right_panel,
             Action::SelectTool => matches!(self.tool, Tool::Select),
+            Action::PatchTool => matches!(self.tool, Tool::Patch(_)),
             _ => return None,
         })
     }
@@ -290,6 +294,7 @@ impl Editor {
             Action::ShowJobs => self.show_page(Page::Jobs),
             Action::ShowReport => self.show_page(Page::Report),
             Action::SelectTool => self.leave_tool(),
+            Action::PatchTool => self.start_patch(),
             Action::CancelJobs => {
                 self.jobs.cancel_all();
                 self.say("Asked every job to stop");

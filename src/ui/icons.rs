@@ -1,6 +1,6 @@
 //! Icons, drawn as strokes on a 16 x 16 grid so that they take the text's colour and stay sharp at any scale.
 
-use egui::{Color32, Pos2, Rect, Response, Sense, Stroke, Ui, pos2, vec2};
+use egui::{Color32, Pos2, Rect, Response, Sense, Stroke, Ui, vec2};
 
 use super::theme;
 
@@ -45,10 +45,7 @@ pub enum Icon {
     Cross,
     Search,
     Trash,
-    Swap,
-    Back,
     Projection,
-    Zoom,
 }
 
 use Mark::{Arc, Dot, Fill, Line};
@@ -213,24 +210,11 @@ impl Icon {
                 Line(&[(6.8, 6.8), (6.8, 11.0)]),
                 Line(&[(9.2, 6.8), (9.2, 11.0)]),
             ],
-            Self::Swap => &[
-                Line(&[(2.5, 5.5), (13.0, 5.5)]),
-                Line(&[(10.2, 2.8), (13.2, 5.5), (10.2, 8.2)]),
-                Line(&[(13.5, 11.0), (3.0, 11.0)]),
-                Line(&[(5.8, 8.3), (2.8, 11.0), (5.8, 13.7)]),
-            ],
-            Self::Back => &[Line(&[(7.0, 3.5), (2.5, 8.0), (7.0, 12.5)]), Line(&[(2.8, 8.0), (13.5, 8.0)])],
             Self::Projection => &[
                 Line(&[(2.5, 3.5), (6.0, 5.5), (6.0, 10.5), (2.5, 12.5), (2.5, 3.5)]),
                 Line(&[(6.0, 5.5), (13.5, 6.6)]),
                 Line(&[(6.0, 10.5), (13.5, 9.4)]),
                 Line(&[(13.5, 6.6), (13.5, 9.4)]),
-            ],
-            Self::Zoom => &[
-                Arc((7.0, 7.0), 4.3, 0.0, 360.0),
-                Line(&[(10.2, 10.2), (13.8, 13.8)]),
-                Line(&[(5.0, 7.0), (9.0, 7.0)]),
-                Line(&[(7.0, 5.0), (7.0, 9.0)]),
             ],
         }
     }
@@ -305,9 +289,4 @@ pub fn label(ui: &mut Ui, icon: Icon, color: Color32, edge: f32) -> Response {
     let (rect, response) = ui.allocate_exact_size(vec2(edge, edge), Sense::hover());
     icon.paint(ui.painter(), rect, color);
     response
-}
-
-/// The corner of a pixel grid, for crisp one-pixel lines.
-pub fn snapped(p: Pos2) -> Pos2 {
-    pos2(p.x.round() + 0.5, p.y.round() + 0.5)
 }

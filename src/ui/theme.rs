@@ -32,8 +32,6 @@ pub struct Tokens {
     pub bad: Color32,
     /// The four sides of a patch; told apart by their numerals as well (Okabe and Ito's palette).
     pub sides: [Color32; 4],
-    /// The viewport's background, top and bottom.
-    pub sky: [Color32; 2],
     /// Behind labels in the viewport.
     pub label: Color32,
 }
@@ -76,7 +74,6 @@ const DARK: Tokens = Tokens {
         Color32::from_rgb(0x1f, 0xc0, 0x92),
         Color32::from_rgb(0xe0, 0x83, 0xb8),
     ],
-    sky: [Color32::from_rgb(0x3a, 0x42, 0x4d), Color32::from_rgb(0x1c, 0x1f, 0x24)],
     label: Color32::from_rgb(0x1b, 0x1e, 0x23),
 };
 
@@ -107,7 +104,6 @@ const LIGHT: Tokens = Tokens {
         Color32::from_rgb(0x00, 0x83, 0x60),
         Color32::from_rgb(0xb0, 0x4a, 0x86),
     ],
-    sky: [Color32::from_rgb(0xff, 0xff, 0xff), Color32::from_rgb(0xd3, 0xda, 0xe2)],
     label: Color32::from_rgb(0xff, 0xff, 0xff),
 };
 

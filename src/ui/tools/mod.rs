@@ -1,47 +1,75 @@
 //! The tools: what a click in the view means, what the status line says, what the Tool page shows.
 
-use egui::Ui;
+use egui::{Order, Ui, vec2};
 use glam::DVec3;
 
 use super::editor::Editor;
 use super::hints::CurveHint;
-use super::viewport::{Overlay, Pointer};
-use crate::view::pick::Filter;
+use super::viewport::{Overlay, Pointer, curve_name};
+use super::{status, theme};
+use crate::view::patch_tool::{Event, Stage};
+use crate::view::pick::{Filter, PickHit, Target};
 
+mod legend;
+mod patch;
+mod patch_overlay;
+mod patch_panel;
 mod select;
+
+use patch::PatchSession;
 
 /// The active tool.
 pub enum Tool {
     /// Clicks select entities.
     Select,
+    /// Four sides are picked and healed.
+    Patch(Box<PatchSession>),
+}
+
+/// The list of everything under the cursor, opened by Alt+click.
+pub struct PickList {
+    at: egui::Pos2,
+    hits: Vec<PickHit>,
 }
 
 impl Editor {
     /// The status line's left part: the tool, what to do now, and the keys.
-    pub fn prompt(&self) -> (&'static str, String, String) {
+    pub fn prompt(&self) -> (String, String, String) {
         match &self.tool {
             Tool::Select => {
-                let prompt = match self.selection.ids().len() {
+                let ids = self.selection.ids();
+                let prompt = match ids.len() {
                     _ if self.files.is_opening() => "Reading the file".to_owned(),
                     _ if self.document().entities().is_empty() => "Open a file, or drop one on the window".to_owned(),
                     0 => "Click an entity".to_owned(),
-                    1 => self
-                        .document()
-                        .get(self.selection.ids()[0])
-                        .map_or(String::new(), |e| format!("{} selected", e.name)),
+                    1 => self.document().get(ids[0]).map_or(String::new(), |e| format!("{} selected", e.name)),
                     n => format!("{n} entities selected"),
                 };
-                ("Select", prompt, "Shift add · F frame · H hide · Ctrl+K find command".to_owned())
+                let keys = "P new patch · Shift add · F frame · H hide · Ctrl+K find command";
+                ("Select".to_owned(), prompt, keys.to_owned())
+            }
+            Tool::Patch(session) => {
+                let text = session.tool.prompt();
+                let mut parts = text.splitn(3, " · ").map(str::to_owned);
+                let mut next = || parts.next().unwrap_or_default();
+                (next(), next(), next())
             }
         }
     }
 
     /// Keys of the active tool.
     pub fn tool_keys(&mut self, ctx: &egui::Context) {
-        let _ = ctx;
+        if self.pick_list.is_some()
+            && ctx.input_mut(|i| super::app::take_key(i, egui::Modifiers::NONE, egui::Key::Escape))
+        {
+            self.pick_list = None;
+        }
+        if let Tool::Patch(_) = self.tool {
+            self.patch_keys(ctx);
+        }
     }
 
-    /// Esc: the tool first, then jobs, then the selection.
+    /// Esc, when the active tool had no use for it: stops a job, then selects nothing.
     pub fn escape(&mut self) {
         let active = self.jobs.active();
         match active.iter().rfind(|job| job.lane == crate::work::Lane::Heavy) {
@@ -55,18 +83,20 @@ impl Editor {
 
     /// Leaves the active tool.
     pub fn leave_tool(&mut self) {
+        if let Tool::Patch(session) = &self.tool
+            && let Some(ticket) = &session.healing
+        {
+            ticket.cancel();
+        }
         self.tool = Tool::Select;
-    }
-
-    /// Takes over what the tool's workers have made.
-    pub fn poll_tool(&mut self, ctx: &egui::Context) {
-        let _ = ctx;
+        self.pick_list = None;
     }
 
     /// The Tool page.
     pub fn tool_panel(&mut self, ui: &mut Ui) {
         match &self.tool {
             Tool::Select => self.select_panel(ui),
+            Tool::Patch(_) => self.patch_panel(ui),
         }
     }
 
@@ -74,31 +104,113 @@ impl Editor {
     pub fn tool_filter(&self) -> (Filter, Vec<DVec3>, u64) {
         match &self.tool {
             Tool::Select => (Filter::ALL, Vec::new(), 0),
+            Tool::Patch(session) => (session.tool.filter(), Vec::new(), session.revision),
         }
     }
 
     /// What the active tool adds to the picture.
     pub fn tool_overlay(&mut self, dark: bool) -> Overlay {
-        let _ = dark;
-        Overlay::default()
+        match &self.tool {
+            Tool::Select => Overlay::default(),
+            Tool::Patch(session) => session.overlay(&self.viewport.scene, dark),
+        }
     }
 
     /// What the mouse did, for the active tool.
-    pub fn tool_pointer(&mut self, ui: &mut Ui, pointer: &Pointer) {
-        let _ = ui;
+    pub fn tool_pointer(&mut self, pointer: &Pointer) {
+        if let (Some(hits), Some(pixel)) = (&pointer.list, pointer.pixel) {
+            self.pick_list = Some(PickList { at: self.viewport.to_window(pixel), hits: hits.clone() });
+            return;
+        }
+        if pointer.click.is_some() && self.pick_list.take().is_some() {
+            return;
+        }
         match &self.tool {
             Tool::Select => self.select_click(pointer),
+            Tool::Patch(_) => self.patch_pointer(pointer),
         }
     }
 
     /// Draws the active tool's labels over the picture.
     pub fn tool_labels(&mut self, ui: &mut Ui, pointer: &Pointer) {
-        let _ = (ui, pointer);
+        if let Tool::Patch(_) = self.tool {
+            self.patch_labels(ui, pointer);
+        }
+        self.show_pick_list(ui);
     }
 
-    /// The curves that the active tool lets one pick, for scripts.
+    fn show_pick_list(&mut self, ui: &Ui) {
+        let Some(list) = &self.pick_list else { return };
+        let mut chosen = None;
+        let area =
+            egui::Area::new(egui::Id::unique("pick list")).order(Order::Foreground).fixed_pos(list.at + vec2(4.0, 4.0));
+        area.show(ui.ctx(), |ui| {
+            egui::Frame::popup(ui.style()).show(ui, |ui| {
+                ui.set_min_width(220.0);
+                if list.hits.is_empty() {
+                    ui.weak("Nothing is here");
+                }
+                for hit in list.hits.iter().take(12) {
+                    let name = self.hit_name(hit).unwrap_or_else(|| "Point".to_owned());
+                    let far = match (hit.distance > 0.0, hit.hidden) {
+                        (_, true) => "behind".to_owned(),
+                        (true, _) => format!("{:.0} px", hit.distance),
+                        _ => status::short(hit.depth),
+                    };
+                    let color = if hit.hidden { theme::of(ui).text[1] } else { theme::of(ui).text[0] };
+                    let button = egui::Button::new(egui::RichText::new(name).color(color)).right_text(far);
+                    if ui.add(button.min_size(vec2(ui.available_width(), theme::ROW))).clicked() {
+                        chosen = Some(*hit);
+                    }
+                }
+            });
+        });
+        let Some(hit) = chosen else { return };
+        self.pick_list = None;
+        match &self.tool {
+            Tool::Select => {
+                if let Some(id) = super::viewport::hit_entity(&hit) {
+                    self.selection.set([id]);
+                }
+            }
+            Tool::Patch(_) => {
+                let held = crate::view::navigation::Modifiers::NONE;
+                self.patch_event(Event::Click { hit: Some(hit), snap: None, held });
+            }
+        }
+    }
+
+    /// One point of every curve that the active tool lets one pick and that a click there would pick, for scripts.
     pub fn curve_hints(&self, scale: f32) -> Vec<CurveHint> {
-        let _ = scale;
-        Vec::new()
+        let Tool::Patch(session) = &self.tool else { return Vec::new() };
+        if !matches!(session.tool.stage(), Stage::Side(_)) || self.viewport.is_moving() {
+            return Vec::new();
+        }
+        let filter = session.tool.filter();
+        let view = self.viewport.view();
+        let mut out = Vec::new();
+        for item in self.viewport.scene.items().iter().filter(|item| item.visible()) {
+            let Some(display) = &item.display else { continue };
+            for curve in &display.curves {
+                let n = curve.points.len();
+                let places = [n / 2, n / 3, 2 * n / 3, n / 4, 3 * n / 4, n / 8, 7 * n / 8];
+                let found = places.into_iter().filter(|&k| k < n).find_map(|k| {
+                    let pixel = view.project(curve.points[k])?.pixel;
+                    let hit = self.viewport.pick_at(pixel, filter)?;
+                    matches!(hit.target, Target::Curve { curve: c, .. } if c == curve.curve).then_some(pixel)
+                });
+                let Some(at) = found.map(|pixel| self.viewport.to_window(pixel)) else { continue };
+                let inside = self.viewport.rect.shrink(2.0).contains(at);
+                if inside {
+                    out.push(CurveHint {
+                        entity: item.id().0,
+                        name: item.entity.name.clone(),
+                        curve: curve_name(&curve.curve),
+                        at: [at.x * scale, at.y * scale],
+                    });
+                }
+            }
+        }
+        out
     }
 }

@@ -35,8 +35,8 @@ impl Editor {
         panels::heading(ui, "Next");
         let next = match (self.document().entities().is_empty(), self.selection.is_empty()) {
             (true, _) => &[Action::Open, Action::OpenExample][..],
-            (_, true) => &[Action::Section, Action::FrameAll],
-            (_, false) => &[Action::FrameSelection, Action::Isolate, Action::Hide, Action::Deselect],
+            (_, true) => &[Action::PatchTool, Action::Section, Action::FrameAll],
+            (_, false) => &[Action::PatchTool, Action::FrameSelection, Action::Isolate, Action::Hide, Action::Deselect],
         };
         for &action in next {
             let info = actions::info(action);

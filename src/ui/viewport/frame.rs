@@ -19,6 +19,8 @@ pub struct Overlay {
     pub revision: u64,
     /// Steps the model back, so that the tool's things stand out.
     pub mute: bool,
+    /// Shows the iso-lines, because they can be picked.
+    pub iso_lines: bool,
     /// Replaces the colours of entities.
     pub fields: Vec<(EntityId, render::Field)>,
     /// Meshes.
@@ -81,7 +83,7 @@ impl Viewport {
         let view = View::new(&self.camera, self.picture(), &self.bounds());
         let theme = if dark { Theme::dark() } else { Theme::light() };
         let look = Look {
-            display: self.display,
+            display: Display { isolines: self.display.isolines || overlay.iso_lines, ..self.display },
             theme,
             coloring: Coloring::Plain,
             section: self.section,
@@ -100,6 +102,10 @@ impl Viewport {
             }
         };
         let mut frame = self.stage.frame(&self.scene, &view, &look, emphasis);
+        // What can be picked stays clear while the rest steps back.
+        for line in frame.lines.iter_mut().filter(|line| line.emphasis == Emphasis::Muted) {
+            line.emphasis = Emphasis::Normal;
+        }
         for item in &mut frame.meshes {
             item.field = overlay.fields.iter().find(|(of, _)| of.0 == item.key.entity).map(|(_, field)| field.clone());
         }

@@ -7,6 +7,7 @@ use super::Viewport;
 use crate::view::camera::Camera;
 use crate::view::navigation::{Button, Drag, Modifiers, Preset, wheel};
 use crate::view::pick::{Filter, PickHit, PickOptions, Target, pick, pick_all, under_cursor};
+use crate::view::snap::{Snap, SnapOptions, snap};
 
 /// Points of scrolling that count as one notch of the wheel.
 const NOTCH: f32 = 40.0;
@@ -32,6 +33,8 @@ pub struct Pointer {
     pub drag_started: bool,
     /// The drag has just ended.
     pub drag_ended: bool,
+    /// The keys held.
+    pub held: Modifiers,
 }
 
 /// What decides what is under the cursor.
@@ -54,6 +57,16 @@ impl Viewport {
     fn options<'a>(&self, filter: Filter, points: &'a [DVec3]) -> PickOptions<'a> {
         let occlusion = !self.display.wireframe && !self.display.xray;
         PickOptions { filter, occlusion, section: self.section, points }
+    }
+
+    /// What a click at a pixel would pick.
+    pub fn pick_at(&self, pixel: DVec2, filter: Filter) -> Option<PickHit> {
+        pick(&self.scene, &self.view(), pixel, &self.options(filter, &[]))
+    }
+
+    /// What a pixel snaps to.
+    pub fn snap(&self, pixel: DVec2, filter: Filter, options: &SnapOptions, suspended: bool) -> Option<Snap> {
+        snap(&self.scene, &self.view(), pixel, &self.options(filter, &[]), options, suspended)
     }
 
     /// Moves the camera and says what the left button did. `points` are those that the tool offers, `stamp` changes
@@ -80,6 +93,7 @@ impl Viewport {
         };
         let pixel = self.to_pixel(at);
         out.pixel = Some(pixel);
+        out.held = modifiers;
         self.navigate(ui, response, preset, modifiers, pixel);
         if response.contains_pointer() && self.drag.is_none() {
             // Ctrl and the wheel arrive as a zoom.

@@ -23,8 +23,10 @@ mod gizmo;
 mod input;
 mod show;
 
-pub use frame::Overlay;
+pub use frame::{Overlay, linear};
+pub use gizmo::tag;
 pub use input::{Pointer, hit_entity};
+pub use show::curve_name;
 
 use input::HoverStamp;
 

@@ -30,7 +30,7 @@ impl Editor {
             false => self.viewport.pointer(ui, &response, self.settings.navigation, filter, &points, stamp),
         };
         if !self.viewport.drag_section(&pointer) {
-            self.tool_pointer(ui, &pointer);
+            self.tool_pointer(&pointer);
         }
         let dark = ui.visuals().dark_mode;
         let t = theme::tokens(dark);

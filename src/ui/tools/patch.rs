@@ -1,0 +1,383 @@
+//! The patch tool at work: what the window adds to the state machine of [`crate::view::patch_tool`]. Events go in,
+//! effects become jobs and commands.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use glam::{DVec2, DVec3};
+
+use super::super::editor::{Editor, Page};
+use super::super::viewport::Pointer;
+use super::Tool;
+use crate::kernel::geom::Surface;
+use crate::kernel::heal::deviation::Check;
+use crate::kernel::heal::preview::{Preview, PreviewOptions, preview};
+use crate::kernel::heal::project::Status;
+use crate::kernel::job::Job;
+use crate::kernel::mesh::surface_set::SurfaceSet;
+use crate::kernel::mesh::tessellate::{SurfaceMesh, tessellate_on};
+use crate::model::command::Command;
+use crate::model::document::{Document, Patch};
+use crate::model::healing;
+use crate::model::resolve::resolve;
+use crate::model::spec::HealSpec;
+use crate::view::deviation::{Deviation, deviation};
+use crate::view::patch_tool::{Effect, Event, Key, PatchTool, Stage};
+use crate::view::pick::PickHit;
+use crate::view::snap::{Snap, SnapOptions};
+use crate::work::{Lane, Latest, Outcome, Ticket};
+
+/// Lines of the deviation map for each span of the patch, and at least and at most.
+const LINES: [usize; 3] = [4, 32, 128];
+/// Distances beyond this fraction of the diagonal are no deviations.
+const FAR: f64 = 0.05;
+/// Distances below this fraction of the diagonal are rounding.
+const NOISE: f64 = 1e-10;
+
+/// A healed patch with what the window shows of it.
+#[derive(Debug)]
+pub struct Shown {
+    /// The patch.
+    pub patch: Arc<Patch>,
+    /// The triangles of the deviation map.
+    pub mesh: SurfaceMesh,
+    /// The deviation at each of its vertices.
+    pub deviation: Deviation,
+    /// The worst check points, largest first.
+    pub worst: Vec<Check>,
+    /// The samples: where they are and what they are.
+    pub samples: Vec<(DVec3, Status)>,
+    /// False when the job was cancelled and this is what was ready.
+    pub complete: bool,
+}
+
+/// What is kept of the surfaces to project on, so that not every preview tessellates them again.
+type Originals = Arc<Mutex<Option<(Option<Vec<usize>>, Arc<SurfaceSet>)>>>;
+
+/// The patch tool in the window.
+pub struct PatchSession {
+    /// Sides, stage, options.
+    pub tool: PatchTool,
+    /// The coarse projection.
+    pub sketch: Latest<Option<Preview>>,
+    /// The heal that runs.
+    pub healing: Option<Ticket<Result<Shown, String>>>,
+    /// The patch to be judged.
+    pub shown: Option<Shown>,
+    /// The ends of the deviation scale.
+    pub range: f64,
+    /// Whether the range stays for the next patch.
+    pub range_locked: bool,
+    /// Shows the box of influence.
+    pub show_slab: bool,
+    /// Which snaps are on.
+    pub snaps: [bool; 5],
+    /// Changes whenever something to draw does.
+    pub revision: u64,
+    /// What the cursor snaps to.
+    pub snap: Option<Snap>,
+    /// The end of a piece that is being dragged: side, piece, end.
+    pub trimming: Option<(usize, usize, usize)>,
+    /// What is under the cursor, for highlighting.
+    pub hover: Option<PickHit>,
+    originals: Originals,
+}
+
+impl PatchSession {
+    fn new(document: &Document) -> Self {
+        Self {
+            tool: PatchTool::new(&document.tolerances(), document.unit),
+            sketch: Latest::default(),
+            healing: None,
+            shown: None,
+            range: 0.0,
+            range_locked: false,
+            show_slab: false,
+            snaps: [true; 5],
+            revision: 1,
+            snap: None,
+            trimming: None,
+            hover: None,
+            originals: Originals::default(),
+        }
+    }
+
+    /// How to snap.
+    pub fn snap_options(&self) -> SnapOptions {
+        SnapOptions { on: self.snaps, ..SnapOptions::new(self.tool.options().joining_tol) }
+    }
+
+    /// The end of a piece within ten pixels of a pixel: side, piece, end.
+    fn end_at(&self, project: impl Fn(DVec3) -> Option<DVec2>, pixel: DVec2) -> Option<(usize, usize, usize)> {
+        if !matches!(self.tool.stage(), Stage::Side(_)) {
+            return None;
+        }
+        let mut best: Option<(f64, (usize, usize, usize))> = None;
+        for (s, side) in self.tool.sides().iter().enumerate().filter(|(_, side)| !side.shared) {
+            for (k, piece) in side.pieces.iter().enumerate() {
+                for (end, p) in piece.ends().into_iter().enumerate() {
+                    let Some(at) = project(p) else { continue };
+                    let d = at.distance(pixel);
+                    if d < 10.0 && best.is_none_or(|b| d < b.0) {
+                        best = Some((d, (s, k, end)));
+                    }
+                }
+            }
+        }
+        best.map(|b| b.1)
+    }
+}
+
+impl Editor {
+    /// Starts picking a patch.
+    pub fn start_patch(&mut self) {
+        if let Tool::Patch(_) = self.tool {
+            return;
+        }
+        let mut session = PatchSession::new(self.document());
+        let count = self.document().patches().count();
+        let mut options = session.tool.options().clone();
+        options.name = format!("Patch {}", count + 1);
+        session.tool.handle(Event::Start, &self.viewport.scene);
+        session.tool.handle(Event::Options(Box::new(options)), &self.viewport.scene);
+        self.selection.clear();
+        self.tool = Tool::Patch(Box::new(session));
+        self.show_page(Page::Tool);
+        self.note = None;
+    }
+
+    /// Hands the tool an event and does what it asks for.
+    pub fn patch_event(&mut self, event: Event) {
+        let Tool::Patch(session) = &mut self.tool else { return };
+        let effects = session.tool.handle(event, &self.viewport.scene);
+        session.revision += 1;
+        for effect in effects {
+            self.patch_effect(effect);
+        }
+    }
+
+    fn patch_effect(&mut self, effect: Effect) {
+        let Tool::Patch(session) = &mut self.tool else { return };
+        match effect {
+            Effect::Project(spec) => {
+                let document = self.history.document().clone();
+                let originals = Arc::clone(&session.originals);
+                session.sketch.request(&mut self.jobs, "Preview the patch", written(&spec), move |job| {
+                    sketch(&document, &spec, &originals, job)
+                });
+            }
+            Effect::Run(spec) => {
+                let document = self.history.document().clone();
+                let originals = Arc::clone(&session.originals);
+                let name = format!("Heal {}", spec.patches.first().map_or("patch", |p| p.name.as_str()));
+                session.healing = Some(
+                    self.jobs
+                        .spawn(Lane::Heavy, name, written(&spec), move |job| heal(&document, &spec, &originals, job)),
+                );
+            }
+            Effect::Cancel => {
+                if let Some(ticket) = session.healing.take() {
+                    ticket.cancel();
+                }
+            }
+            Effect::Accept { name, patch } => {
+                session.shown = None;
+                let patches = vec![(name.clone(), (*patch).clone())];
+                if self.command(&Command::AddPatches { patches }) {
+                    self.say(format!("{name} added; pick its neighbour, or leave with Esc"));
+                }
+            }
+            Effect::Leave => self.leave_tool(),
+        }
+    }
+
+    /// Takes over what the tool's workers have made.
+    pub fn poll_tool(&mut self) {
+        let Tool::Patch(session) = &mut self.tool else { return };
+        if session.sketch.poll() {
+            session.revision += 1;
+        }
+        let Some(outcome) = session.healing.as_ref().and_then(Ticket::poll) else { return };
+        session.healing = None;
+        session.revision += 1;
+        let event = match outcome {
+            Outcome::Finished { value: Ok(shown), .. } => {
+                if !session.range_locked || session.range <= 0.0 {
+                    session.range = default_range(&shown, session.tool.options().tol);
+                }
+                let patch = Arc::clone(&shown.patch);
+                session.shown = Some(shown);
+                Event::Finished(Ok(patch))
+            }
+            Outcome::Finished { cancelled: true, .. } | Outcome::NeverRan => Event::Cancelled,
+            Outcome::Finished { value: Err(why), .. } => Event::Finished(Err(why)),
+            Outcome::Panicked { message, input } => {
+                self.died("Healing the patch", &message, input);
+                Event::Cancelled
+            }
+        };
+        self.patch_event(event);
+    }
+
+    /// Keys of the patch tool.
+    pub fn patch_keys(&mut self, ctx: &egui::Context) {
+        use egui::{Key as K, Modifiers};
+        const KEYS: [(K, Key); 18] = [
+            (K::Enter, Key::Enter),
+            (K::Backspace, Key::Backspace),
+            (K::Escape, Key::Escape),
+            (K::Num1, Key::Digit(1)),
+            (K::Num2, Key::Digit(2)),
+            (K::Num3, Key::Digit(3)),
+            (K::Num4, Key::Digit(4)),
+            (K::X, Key::Flip),
+            (K::T, Key::Chain),
+            (K::Tab, Key::Tab),
+            (K::L, Key::Line),
+            (K::P, Key::Polyline),
+            (K::W, Key::Draw),
+            (K::C, Key::Trim),
+            (K::V, Key::Preview),
+            (K::D, Key::Deviation),
+            (K::Questionmark, Key::Help),
+            (K::Slash, Key::Help),
+        ];
+        let mut pressed = Vec::new();
+        let mut snaps = false;
+        ctx.input_mut(|input| {
+            for (k, key) in KEYS {
+                let held = if k == K::Questionmark || k == K::Slash { Modifiers::SHIFT } else { Modifiers::NONE };
+                if super::super::app::take_key(input, held, k) {
+                    pressed.push(key);
+                }
+            }
+            snaps = super::super::app::take_key(input, Modifiers::NONE, K::S);
+        });
+        for key in pressed {
+            self.patch_event(Event::Key(key));
+        }
+        if let (true, Tool::Patch(session)) = (snaps, &mut self.tool) {
+            let on = session.snaps.iter().any(|on| *on);
+            session.snaps = [!on; 5];
+            self.say(if on { "Snapping is off" } else { "Snapping is on" });
+        }
+    }
+
+    /// What the mouse did, for the patch tool.
+    pub fn patch_pointer(&mut self, pointer: &Pointer) {
+        let viewport = &self.viewport;
+        let Tool::Patch(session) = &mut self.tool else { return };
+        let project = |p: DVec3| viewport.view().project(p).map(|at| at.pixel);
+        if pointer.drag_started
+            && let Some((start, _)) = pointer.drag
+        {
+            session.trimming = session.end_at(project, start);
+        }
+        let ctrl = pointer.held.ctrl;
+        let wants = session.tool.wants_point() || session.trimming.is_some();
+        let snap = pointer.pixel.filter(|_| wants).and_then(|pixel| {
+            let filter = session.tool.filter();
+            viewport.snap(pixel, filter, &session.snap_options(), ctrl)
+        });
+        if session.snap != snap || session.hover != pointer.hover {
+            session.revision += 1;
+        }
+        (session.snap, session.hover) = (snap.clone(), pointer.hover);
+        if let Some((side, piece, end)) = session.trimming {
+            if pointer.drag_ended {
+                session.trimming = None;
+                let at = snap.map(|s| s.point).or(pointer.hover.map(|h| h.point)).or_else(|| {
+                    let (_, now) = pointer.drag?;
+                    let p = session.tool.sides().get(side)?.pieces.get(piece)?.ends()[end];
+                    let view = viewport.view();
+                    Some(view.unproject(now, view.depth(p)))
+                });
+                if let Some(to) = at {
+                    self.patch_event(Event::Trim { side, piece, end, to });
+                }
+            }
+            return;
+        }
+        if let Some((hit, held)) = pointer.click {
+            self.patch_event(Event::Click { hit, snap, held });
+        }
+    }
+
+    /// Puts the camera on a place of the result.
+    pub fn zoom_to(&mut self, p: DVec3) {
+        let Tool::Patch(session) = &self.tool else { return };
+        let size = session.shown.as_ref().map_or(1.0, |s| s.patch.surface.bounds().diagonal());
+        let bounds = crate::kernel::geom::Aabb { min: p, max: p }.grown(0.06 * size);
+        self.viewport.frame(&bounds);
+    }
+}
+
+/// The specification as text, for the record of jobs and for bug reports.
+fn written(spec: &HealSpec) -> String {
+    ron::ser::to_string_pretty(spec, ron::ser::PrettyConfig::default()).unwrap_or_default()
+}
+
+/// The originals of a heal, tessellated once for a choice of surfaces.
+fn originals_of(
+    kept: &Originals,
+    onto: Option<&Vec<usize>>,
+    surfaces: &[(usize, Arc<Surface>)],
+    tol: f64,
+    job: &Job,
+) -> Arc<SurfaceSet> {
+    let mut slot = kept.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((of, set)) = &*slot
+        && of.as_ref() == onto
+    {
+        return Arc::clone(set);
+    }
+    let set = Arc::new(SurfaceSet::new(surfaces.to_vec(), tol, job));
+    // A set that a cancelled job left unfinished is not worth keeping.
+    if !job.is_cancelled() {
+        *slot = Some((onto.cloned(), Arc::clone(&set)));
+    }
+    set
+}
+
+fn sketch(document: &Document, spec: &HealSpec, kept: &Originals, job: &Job) -> Option<Preview> {
+    let resolved = resolve(spec, document, job).ok()?;
+    let patch = resolved.patches.first()?;
+    let set = originals_of(kept, spec.onto.as_ref(), &resolved.surfaces, resolved.options.chord_tol, job);
+    let options = PreviewOptions { slab: spec.slab, choice: patch.choice, ..PreviewOptions::default() };
+    preview(&patch.sides, Some(&set), &options, job)
+}
+
+fn heal(document: &Document, spec: &HealSpec, kept: &Originals, job: &Job) -> Result<Shown, String> {
+    let healing = healing::run(document, spec, job).map_err(|e| e.to_string())?;
+    let (Some(healed), Some((_, patch))) = (healing.healed.patches.first(), healing.patches.first()) else {
+        return Err("The heal was cancelled before there was a patch".to_owned());
+    };
+    let complete = healing.healed.complete;
+    // The map is measured even for a partial result: its evidence matters as much.
+    let measure = Job::new();
+    job.phase("Measuring deviations");
+    let resolved = resolve(spec, document, &measure).map_err(|e| e.to_string())?;
+    let set = originals_of(kept, spec.onto.as_ref(), &resolved.surfaces, resolved.options.chord_tol, &measure);
+    let surface = Arc::clone(&patch.surface);
+    let [per_span, least, most] = LINES;
+    let lines = [0, 1].map(|k| {
+        let [a, b] = surface.domain()[k];
+        let n = (per_span * patch.report.resolution[k]).clamp(least, most);
+        (0..=n).map(|i| if i == n { b } else { a + (b - a) * i as f64 / n as f64 }).collect()
+    });
+    let mesh = tessellate_on(&surface, lines, false);
+    let diagonal = document.bounds().diagonal();
+    let deviation = deviation(&mesh, &set, FAR * diagonal, NOISE * diagonal, &measure);
+    Ok(Shown {
+        patch: Arc::new(patch.clone()),
+        mesh,
+        deviation,
+        worst: healed.deviation.worst(3),
+        samples: healed.samples.values().iter().map(|s| (s.point, s.status)).collect(),
+        complete,
+    })
+}
+
+/// The ends of the scale: what was measured, and never less than three tolerances.
+fn default_range(shown: &Shown, tol: f64) -> f64 {
+    shown.deviation.max.max(3.0 * tol)
+}
