@@ -158,7 +158,7 @@ impl App {
             }
         }
         let Some(mut dialog) = editor.dialog.take() else { return };
-        let answer = dialog.show(ctx, &mut editor.settings, &super::files::examples());
+        let answer = dialog.show(ctx, &mut editor.settings, super::files::examples());
         match answer {
             Answer::Stay => editor.dialog = Some(dialog),
             Answer::SettingsChanged => {

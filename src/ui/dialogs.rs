@@ -268,7 +268,7 @@ impl Dialog {
                 ui.heading("Open example");
                 ui.add_space(6.0);
                 for (name, about) in examples {
-                    if row(ui, Icon::Surface, name, about).clicked() {
+                    if row(ui, Icon::Surface, &super::files::readable(name), about).clicked() {
                         return Answer::Example(name);
                     }
                 }

@@ -1,6 +1,7 @@
 //! Opening and saving, in workers: the window never waits for a disk.
 
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use super::dialogs::{Dialog, PathField, Problem, SaveWhat, Then};
 use super::editor::{Editor, Page};
@@ -272,8 +273,10 @@ fn write_spec(path: &Path, document: &Document) -> Result<Saved, String> {
 }
 
 /// The bundled examples: names and what each shows.
-pub fn examples() -> Vec<(&'static str, &'static str)> {
-    Vec::new()
+pub fn examples() -> &'static [(&'static str, &'static str)] {
+    static LIST: LazyLock<Vec<(&str, &str)>> =
+        LazyLock::new(|| crate::model::examples::all().iter().map(|e| (e.name, e.about)).collect());
+    &LIST
 }
 
 impl Editor {
@@ -288,13 +291,29 @@ impl Editor {
 
     /// Opens an example, unsaved changes or not.
     pub fn open_example_now(&mut self, name: &'static str) {
-        let _ = name;
+        let Some(example) = crate::model::examples::all().into_iter().find(|e| e.name == name) else {
+            self.warn(format!("There is no example called {name}"));
+            return;
+        };
+        self.show_document(example.document, None, readable(name), true);
+        self.files.source = None;
+        self.autosave_fresh(None);
+        self.say(example.about);
     }
 
     /// Opens the example that a session without files starts with.
     pub fn open_first_example(&mut self) {
-        if let Some((name, _)) = examples().first() {
+        if let Some((name, _)) = examples().get(1).or(examples().first()) {
             self.open_example_now(name);
         }
     }
+}
+
+/// The name of an example for people: "car body".
+pub fn readable(name: &str) -> String {
+    let mut text = name.replace('_', " ");
+    if let Some(first) = text.get_mut(..1) {
+        first.make_ascii_uppercase();
+    }
+    text
 }
