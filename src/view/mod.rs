@@ -2,8 +2,10 @@
 //! is plain data and is tested without a display.
 
 pub mod camera;
-pub mod deviation;
+pub mod colormap;
 pub mod display;
+pub mod histogram;
+pub mod legend;
 pub mod navigation;
 pub mod patch_tool;
 pub mod pick;
@@ -12,3 +14,5 @@ pub mod section;
 pub mod segment_tree;
 pub mod snap;
 pub mod viewport;
+pub mod visibility;
+pub mod worst;
