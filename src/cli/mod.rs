@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
 
+pub mod bvh;
 pub mod convert;
 mod error;
 pub mod examples;
@@ -50,6 +51,8 @@ pub enum Command {
     Info(info::Args),
     /// Convert a file into another format
     Convert(convert::Args),
+    /// Build the hierarchy of a surface: sizes, build and traversal times, pair counts
+    Bvh(bvh::Args),
     /// Intersect two sets of surfaces
     Intersect(intersect::Args),
     /// Make a picture of a model
@@ -73,6 +76,7 @@ pub fn run(command: &Command, common: &Common) -> Exit {
     let result = match command {
         Command::Info(args) => info::run(args, common),
         Command::Convert(args) => convert::run(args, common),
+        Command::Bvh(args) => bvh::run(args, common),
         Command::Intersect(args) => intersect::run(args, common),
         #[cfg(feature = "editor")]
         Command::Render(args) => render::run(args, common),

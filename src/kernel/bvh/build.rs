@@ -4,7 +4,9 @@
 //! SIMD pay. The first levels, above the lanes, are built one by one. Every node's numbers come from the same
 //! sequence of operations in any build, so the bytes do not depend on lanes, threads or the order of queries.
 
-use pulp::{Arch, Scalar, Simd, WithSimd};
+use std::sync::Arc;
+
+use pulp::{Scalar, Simd, WithSimd};
 
 use super::fit::fit;
 use super::net::{Bicubic, General, Shape, power_matrix, split};
@@ -25,11 +27,11 @@ pub(crate) struct Recipe {
     slack: f64,
     /// The same for coefficients in powers.
     noise: f64,
-    matrices: [Vec<f64>; 2],
+    matrices: Matrices,
 }
 
-/// Where a subtree's nodes go: one slice per level, the first of length 1, and one torus per node of the last
-/// level (or none).
+/// Where a subtree's nodes go: one slice per level (the root's may be empty: it is skipped), and one torus per node
+/// of the last level, or none. There are at least two levels, or only the root.
 pub(crate) struct Slots<'a> {
     pub levels: Vec<&'a mut [Node]>,
     pub tori: &'a mut [LeafTorus],
@@ -44,25 +46,56 @@ pub(crate) fn direction(depth: usize) -> Direction {
 /// Which instructions a build uses. The bytes are the same.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Instructions {
-    /// The widest that the processor has.
+    /// The widest that the processor has: four lanes with AVX2, two without.
     #[default]
     Best,
-    /// Plain code.
+    /// Two lanes, which every x86-64 processor since 2009 has; plain code elsewhere.
+    Narrow,
+    /// Plain code, one number at a time.
     Plain,
+}
+
+impl Instructions {
+    #[cfg(target_arch = "x86_64")]
+    fn dispatch<Op: WithSimd>(self, op: Op) -> Op::Output {
+        match self {
+            Self::Best => {
+                if let Some(simd) = pulp::x86::V3::try_new() {
+                    return Simd::vectorize(simd, op);
+                }
+            }
+            Self::Narrow => {}
+            Self::Plain => return Scalar::new().vectorize(op),
+        }
+        match pulp::x86::V2::try_new() {
+            Some(simd) => Simd::vectorize(simd, op),
+            None => Scalar::new().vectorize(op),
+        }
+    }
+
+    #[cfg(not(target_arch = "x86_64"))]
+    fn dispatch<Op: WithSimd>(self, op: Op) -> Op::Output {
+        match self {
+            Self::Best => pulp::Arch::new().dispatch(op),
+            Self::Narrow | Self::Plain => Scalar::new().vectorize(op),
+        }
+    }
+}
+
+/// The matrices that rewrite a net in powers, for the two degrees.
+pub(crate) type Matrices = Arc<[Vec<f64>; 2]>;
+
+/// The matrices for patches of the given degrees; made once for a surface.
+pub(crate) fn matrices(degree: [usize; 2]) -> Matrices {
+    Arc::new(degree.map(power_matrix))
 }
 
 impl Recipe {
     /// For a net of the given kind with coordinates of at most `scale`.
-    pub fn new(degree: [usize; 2], rational: bool, scale: f64) -> Self {
-        let matrices = degree.map(power_matrix);
+    pub fn new(degree: [usize; 2], rational: bool, scale: f64, matrices: Matrices) -> Self {
         let growth: f64 = matrices.iter().map(|m| m.iter().map(|x| x.abs()).sum::<f64>()).product();
         let slack = 8.0 * f64::EPSILON * (degree[0] + degree[1] + 2) as f64 * scale;
         Self { degree, rational, slack, noise: slack.max(4.0 * f64::EPSILON * growth * scale), matrices }
-    }
-
-    /// Bytes on the heap.
-    pub fn heap_bytes(&self) -> usize {
-        self.matrices.iter().map(|m| m.capacity() * size_of::<f64>()).sum()
     }
 
     /// The subnet at a heap index (1 is the whole net), by splitting down the path.
@@ -84,24 +117,42 @@ impl Recipe {
     }
 
     fn run<H: Shape>(&self, shape: H, net: &[f64], depth: usize, slots: Slots, instructions: Instructions) {
-        let subtree = Subtree { recipe: self, shape, net, depth, slots };
-        match instructions {
-            Instructions::Best => Arch::new().dispatch(subtree),
-            Instructions::Plain => subtree.with_simd(Scalar::new()),
-        }
+        instructions.dispatch(Subtree { recipe: self, shape, net, depth, slots });
     }
 }
 
 fn subnet<H: Shape>(shape: H, net: &[f64], index: u32) -> Vec<f64> {
-    let mut net = net.to_vec();
-    let (mut low, mut high) = (net.clone(), net.clone());
+    let size = shape.size();
+    let mut room = vec![0.0; 3 * size];
+    room[..size].copy_from_slice(net);
     let depth = index.ilog2() as usize;
+    // The net and its two halves take turns in three places.
+    let mut here = 0;
     for level in 0..depth {
-        split(shape, direction(level), &net, &mut low, &mut high);
-        let upper = index >> (depth - 1 - level) & 1 == 1;
-        std::mem::swap(&mut net, if upper { &mut high } else { &mut low });
+        let [low, high] = [(here + 1) % 3, (here + 2) % 3];
+        split_within(shape, direction(level), &mut room, [here, low, high]);
+        here = if index >> (depth - 1 - level) & 1 == 1 { high } else { low };
     }
-    net
+    room.copy_within(here * size..(here + 1) * size, 0);
+    room.truncate(size);
+    room
+}
+
+/// Splits the net in one place of a row of nets into two others.
+fn split_within<H: Shape>(shape: H, direction: Direction, nets: &mut [f64], [from, low, high]: [usize; 3]) {
+    let size = shape.size();
+    let mut places = [None, None, None];
+    for (k, net) in nets.chunks_exact_mut(size).enumerate() {
+        match k {
+            _ if k == from => places[0] = Some(net),
+            _ if k == low => places[1] = Some(net),
+            _ if k == high => places[2] = Some(net),
+            _ => {}
+        }
+    }
+    if let [Some(net), Some(low), Some(high)] = places {
+        split(shape, direction, net, low, high);
+    }
 }
 
 struct Subtree<'a, H> {
@@ -117,56 +168,31 @@ impl<H: Shape> WithSimd for Subtree<'_, H> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Self { recipe, shape, net, depth, mut slots } = self;
-        let last = slots.levels.len() - 1;
-        let above = (S::F64_LANES.ilog2() as usize).min(last);
-        let nets = above_lanes(recipe, shape, net, depth, above, &mut slots.levels);
-        lanes(simd, recipe, shape, &nets, depth, above, slots);
+        let Self { recipe, shape, net, depth, slots } = self;
+        lanes(simd, recipe, shape, net, depth, slots);
     }
 }
 
-/// Builds the levels above the lanes one node at a time; returns the nets of the first level of the lanes.
-fn above_lanes<H: Shape>(
-    recipe: &Recipe,
-    shape: H,
-    net: &[f64],
-    depth: usize,
-    above: usize,
-    levels: &mut [&mut [Node]],
-) -> Vec<Vec<f64>> {
-    let simd = Scalar::new();
-    let mut nets = vec![net.to_vec()];
-    for (level, nodes) in levels.iter_mut().enumerate().take(above) {
-        let mut next = Vec::with_capacity(2 * nets.len());
-        for (net, node) in nets.iter().zip(nodes.iter_mut()) {
-            let plain: Vec<F<Scalar>> = net.iter().map(|&x| F::splat(simd, x)).collect();
-            let mut scratch = plain.clone();
-            let fitted = fit(simd, shape, &plain, &mut scratch, F::splat(simd, recipe.slack));
-            Node::store(&fitted, |_, fitted| *node = fitted);
-            let (mut low, mut high) = (net.clone(), net.clone());
-            split(shape, direction(depth + level), net, &mut low, &mut high);
-            next.extend([low, high]);
+/// The nets of the levels from the root down to the first that fills the lanes, in heap order from 0.
+fn first_levels<H: Shape>(shape: H, net: &[f64], depth: usize, count: usize) -> Vec<f64> {
+    let size = shape.size();
+    let mut nets = vec![0.0; ((2 << count) - 1) * size];
+    nets[..size].copy_from_slice(net);
+    for level in 0..count {
+        for at in (1 << level) - 1..(2 << level) - 1 {
+            split_within(shape, direction(depth + level), &mut nets, [at, 2 * at + 1, 2 * at + 2]);
         }
-        nets = next;
     }
     nets
 }
 
-/// Builds the rest, each lane its own subtree.
 #[inline(always)]
-fn lanes<S: Simd, H: Shape>(
-    simd: S,
-    recipe: &Recipe,
-    shape: H,
-    nets: &[Vec<f64>],
-    depth: usize,
-    above: usize,
-    slots: Slots,
-) {
+fn lanes<S: Simd, H: Shape>(simd: S, recipe: &Recipe, shape: H, net: &[f64], depth: usize, slots: Slots) {
     let Slots { mut levels, tori } = slots;
     let size = shape.size();
     let last = levels.len() - 1;
-    let used = nets.len();
+    let above = (S::F64_LANES.ilog2() as usize).min(last);
+    let first_nets = first_levels(shape, net, depth, above);
     let zero = F::splat(simd, 0.0);
     let slack = F::splat(simd, recipe.slack);
     let noise = F::splat(simd, recipe.noise);
@@ -174,26 +200,38 @@ fn lanes<S: Simd, H: Shape>(
     // Both children of every level of the path, then room for the fits.
     let mut nets_of_path = vec![zero; (2 * (last - above) + 2) * size];
     let mut scratch = vec![zero; 2 * size];
-    let mut column = [0.0; 64];
-    for (i, slot) in nets_of_path[..size].iter_mut().enumerate() {
-        for lane in 0..S::F64_LANES {
-            column[lane] = nets[lane.min(used - 1)][i];
-        }
-        *slot = F::load(simd, &column[..S::F64_LANES]);
-    }
-    let (mut level, mut path) = (above, 0_usize);
+    // The levels above fill only some of the lanes; from `above` on each lane is a subtree of its own.
+    let (mut level, mut path) = (0, 0_usize);
     loop {
-        let down = level - above;
+        if level <= above && path == 0 {
+            let count = 1 << level;
+            let nets = &first_nets[(count - 1) * size..(2 * count - 1) * size];
+            let mut column = [0.0; 64];
+            for (i, slot) in nets_of_path[..size].iter_mut().enumerate() {
+                for lane in 0..S::F64_LANES {
+                    column[lane] = nets[lane.min(count - 1) * size + i];
+                }
+                *slot = F::load(simd, &column[..S::F64_LANES]);
+            }
+        }
+        let used = 1 << level.min(above);
+        let down = level.saturating_sub(above);
         let here = if down == 0 { 0 } else { (2 * down + (path & 1)) * size };
         let (nets_here, nets_below) = nets_of_path.split_at_mut((2 * down + 2) * size);
         let net = &nets_here[here..here + size];
-        let fitted = fit(simd, shape, net, &mut scratch, slack);
         let row = &mut levels[level];
-        Node::store(&fitted, |lane, node| {
-            if lane < used {
-                row[(lane << down) | path] = node;
-            }
-        });
+        if level < last && row.is_empty() {
+            level += 1;
+            continue;
+        }
+        let fitted = fit(simd, shape, net, &mut scratch, slack);
+        for lane in 0..used {
+            row[(lane << down) | path] = Node::of_lane(&fitted, lane);
+        }
+        if level < above {
+            level += 1;
+            continue;
+        }
         if level < last {
             let (low, high) = nets_below[..2 * size].split_at_mut(size);
             split(shape, direction(depth + level), net, low, high);
@@ -205,8 +243,8 @@ fn lanes<S: Simd, H: Shape>(
             let numbers = osculate(simd, shape, net, matrices, fitted.center, &mut scratch, noise);
             let mut plain = [0.0; LEAF_NUMBERS];
             for lane in 0..used {
-                for (plain, number) in plain.iter_mut().zip(&numbers) {
-                    *plain = number.lanes()[lane];
+                for k in 0..LEAF_NUMBERS {
+                    plain[k] = numbers[k].lanes()[lane];
                 }
                 tori[(lane << down) | path] = LeafTorus::from_numbers(&plain);
             }

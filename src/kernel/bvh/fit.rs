@@ -71,26 +71,25 @@ pub(crate) fn fit<S: Simd, H: Shape>(simd: S, shape: H, net: &[F<S>], scratch: &
     let (ys, rest) = rest.split_at_mut(n);
     let zs = &mut rest[..n];
     let huge = one * f64::MAX;
-    let mut low = [huge; 5];
-    let mut high = [-huge; 5];
+    let (mut low, mut high) = ([huge; 5], [-huge; 5]);
     for i in 0..n {
         let p = point(shape, net, i);
         let (x, y, z) = (p.dot(e1), p.dot(e2), p.dot(m));
         (xs[i], ys[i], zs[i]) = (x, y, z);
-        for (k, value) in [x, y, z, x * cos + y * sin, y * cos - x * sin].into_iter().enumerate() {
-            low[k] = low[k].min(value);
-            high[k] = high[k].max(value);
-        }
+        let turned = (x * cos + y * sin, y * cos - x * sin);
+        (low[0], high[0]) = (low[0].min(x), high[0].max(x));
+        (low[1], high[1]) = (low[1].min(y), high[1].max(y));
+        (low[2], high[2]) = (low[2].min(z), high[2].max(z));
+        (low[3], high[3]) = (low[3].min(turned.0), high[3].max(turned.0));
+        (low[4], high[4]) = (low[4].min(turned.1), high[4].max(turned.1));
     }
-    let area = |i: usize, j: usize| (high[i] - low[i]) * (high[j] - low[j]);
-    let (first, second) = (area(0, 1), area(3, 4));
-    let pick = |x: F<S>, y: F<S>| second.less(first, y, x);
-    let (turn_cos, turn_sin) = (pick(one, cos), pick(zero, sin));
-    let range = |i: usize, j: usize| {
-        let (low, high) = (pick(low[i], low[j]), pick(high[i], high[j]));
-        ((low + high) * 0.5, (high - low) * 0.5)
-    };
-    let ((cx, hx), (cy, hy)) = (range(0, 3), range(1, 4));
+    let first = (high[0] - low[0]) * (high[1] - low[1]);
+    let second = (high[3] - low[3]) * (high[4] - low[4]);
+    let (turn_cos, turn_sin) = (second.less(first, cos, one), second.less(first, sin, zero));
+    let (low_x, high_x) = (second.less(first, low[3], low[0]), second.less(first, high[3], high[0]));
+    let (low_y, high_y) = (second.less(first, low[4], low[1]), second.less(first, high[4], high[1]));
+    let (cx, hx) = ((low_x + high_x) * 0.5, (high_x - low_x) * 0.5);
+    let (cy, hy) = ((low_y + high_y) * 0.5, (high_y - low_y) * 0.5);
     let (cz, hz) = ((low[2] + high[2]) * 0.5, (high[2] - low[2]) * 0.5);
 
     // All faces move in until the thinnest direction is gone.
@@ -162,6 +161,12 @@ impl<S: Simd> Fan<S> {
     }
 }
 
+/// One coordinate of a vector of the tangent net of a rational patch.
+#[inline(always)]
+fn tangent<S: Simd>(w: &[F<S>], xs: &[F<S>], [ij, kl, kj, il]: [usize; 4]) -> F<S> {
+    w[kl] * w[ij] * (xs[kl] - xs[ij]) + w[kj] * w[il] * (xs[kj] - xs[il])
+}
+
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
 fn cone<S: Simd, H: Shape>(
@@ -185,22 +190,19 @@ fn cone<S: Simd, H: Shape>(
         let w = &net[3 * n..];
         let size = w[..n].iter().fold(zero, |size, &w| size.max(w));
         let slack = slack * (size * size) * 4.0;
-        let tangent = |xs: &[F<S>], [ij, kl, kj, il]: [usize; 4]| {
-            w[kl] * w[ij] * (xs[kl] - xs[ij]) + w[kj] * w[il] * (xs[kj] - xs[il])
-        };
         for i in 0..=p {
             for k in i..=p {
                 for j in 0..=q {
                     for l in j..=q {
-                        let at = |i: usize, j: usize| j * width + i;
+                        let (ij, kl, kj, il) = (j * width + i, l * width + k, j * width + k, l * width + i);
                         if i < k {
-                            let ends = [at(i, j), at(k, l), at(k, j), at(i, l)];
-                            let (x, y, z) = (tangent(xs, ends), tangent(ys, ends), tangent(zs, ends));
+                            let ends = [ij, kl, kj, il];
+                            let (x, y, z) = (tangent(w, xs, ends), tangent(w, ys, ends), tangent(w, zs, ends));
                             fans[0].add(x, y, z, slack);
                         }
                         if j < l {
-                            let ends = [at(i, j), at(k, l), at(i, l), at(k, j)];
-                            let (x, y, z) = (tangent(xs, ends), tangent(ys, ends), tangent(zs, ends));
+                            let ends = [ij, kl, il, kj];
+                            let (x, y, z) = (tangent(w, xs, ends), tangent(w, ys, ends), tangent(w, zs, ends));
                             fans[1].add(x * cos + y * sin, y * cos - x * sin, z, slack);
                         }
                     }
@@ -232,8 +234,8 @@ fn cone<S: Simd, H: Shape>(
     let sine = (slope / (one + slope)).sqrt() + 1e-6;
     let wide = one * 2.0;
     let mut sine = sine.less(one * WIDE, sine, wide);
-    for condition in [plane, u.forward, v.forward, spread_cos - cos.abs() + (-1e-12)] {
-        sine = zero.less(condition, sine, wide);
-    }
+    sine = zero.less(plane, sine, wide);
+    sine = zero.less(u.forward.min(v.forward), sine, wide);
+    sine = zero.less(spread_cos - cos.abs() + (-1e-12), sine, wide);
     m * sine.less(one, one + sine, zero)
 }

@@ -183,7 +183,11 @@ pub(crate) fn powers<S: Simd, H: Shape>(shape: H, net: &[F<S>], matrices: [&[f64
             for line in 0..lines {
                 let at = |i: usize| line * step + i * stride;
                 if length == 4 {
-                    let [a, b, c, d] = [0, 1, 2, 3].map(|i| if from_net { net[at(i)] } else { out[at(i)] });
+                    let [a, b, c, d] = if from_net {
+                        [net[at(0)], net[at(1)], net[at(2)], net[at(3)]]
+                    } else {
+                        [out[at(0)], out[at(1)], out[at(2)], out[at(3)]]
+                    };
                     let (outer, inner) = (a + d, b + c);
                     let (rise, middle) = (d - a, c - b);
                     out[at(0)] = (outer + inner * 3.0) * 0.125;

@@ -10,6 +10,7 @@ use pulp::Simd;
 
 use super::fit::Fitted;
 use super::rectangle::Rectangle;
+use crate::kernel::num::lanes::F3;
 
 /// Bounds of the normals of a subpatch: all lie within an angle of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,23 +55,16 @@ pub struct Node {
 }
 
 impl Node {
-    /// The nodes of the first lanes of a fit.
+    /// The node of one lane of a fit.
     #[inline(always)]
-    pub(crate) fn store<S: Simd>(fitted: &Fitted<S>, mut place: impl FnMut(usize, Self)) {
-        for lane in 0..S::F64_LANES {
-            let f = |x: &crate::kernel::num::lanes::F<S>| x.lanes()[lane] as f32;
-            let v = |v: &crate::kernel::num::lanes::F3<S>| [f(&v.x), f(&v.y), f(&v.z)];
-            place(
-                lane,
-                Self {
-                    center: v(&fitted.center),
-                    axes: [v(&fitted.axes[0]), v(&fitted.axes[1])],
-                    half: [f(&fitted.half[0]), f(&fitted.half[1])],
-                    radius: f(&fitted.radius),
-                    sphere: f(&fitted.sphere),
-                    cone: v(&fitted.cone),
-                },
-            );
+    pub(crate) fn of_lane<S: Simd>(fitted: &Fitted<S>, lane: usize) -> Self {
+        Self {
+            center: lane_vector(&fitted.center, lane),
+            axes: [lane_vector(&fitted.axes[0], lane), lane_vector(&fitted.axes[1], lane)],
+            half: [fitted.half[0].lanes()[lane] as f32, fitted.half[1].lanes()[lane] as f32],
+            radius: fitted.radius.lanes()[lane] as f32,
+            sphere: fitted.sphere.lanes()[lane] as f32,
+            cone: lane_vector(&fitted.cone, lane),
         }
     }
 
@@ -145,4 +139,9 @@ impl Node {
 #[inline]
 fn vector(v: [f32; 3]) -> DVec3 {
     DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]))
+}
+
+#[inline(always)]
+fn lane_vector<S: Simd>(v: &F3<S>, lane: usize) -> [f32; 3] {
+    [v.x.lanes()[lane] as f32, v.y.lanes()[lane] as f32, v.z.lanes()[lane] as f32]
 }

@@ -34,21 +34,33 @@ struct Sums<S: Simd> {
 
 impl<S: Simd> Sums<S> {
     #[inline(always)]
-    fn of<H: Shape>(shape: H, coefficients: &[F<S>]) -> Self {
+    fn of<H: Shape>(shape: H, c: &[F<S>]) -> Self {
         let [p, q] = shape.degree();
-        let zero = coefficients[0].with(0.0);
+        let zero = c[0].with(0.0);
         let mut sums = Self { value: [zero; 5], by_s: [zero; 5], by_t: [zero; 5] };
+        if p == 3 && q == 3 {
+            // Written out: the compiler does not unroll the loop below.
+            let (c20, c02, c11) = (c[2].abs(), c[8].abs(), c[5].abs());
+            let (c10, c01) = (c[1].abs(), c[4].abs());
+            let (c30, c21, c12, c03) = (c[3].abs(), c[6].abs(), c[9].abs(), c[12].abs());
+            let (c31, c22, c13) = (c[7].abs(), c[10].abs(), c[13].abs());
+            let (c32, c23, c33) = (c[11].abs(), c[14].abs(), c[15].abs());
+            let (twice, thrice) = (c22 + c23, c31 + c32 + c33);
+            let (twice_t, thrice_t) = (c22 + c32, c13 + c23 + c33);
+            sums.value = [c[0].abs(), c10 + c01, c20 + c11 + c02, c30 + c21 + c12 + c03, thrice + c22 + c13 + c23];
+            sums.by_s =
+                [zero, c10, c20 + c20 + c11, c30 * 3.0 + (c21 + c21) + c12, thrice * 3.0 + (twice + twice) + c13];
+            sums.by_t =
+                [zero, c01, c02 + c02 + c11, c03 * 3.0 + (c12 + c12) + c21, thrice_t * 3.0 + (twice_t + twice_t) + c31];
+            return sums;
+        }
         for j in 0..=q {
             for i in 0..=p {
-                let c = coefficients[j * (p + 1) + i].abs();
+                let c = c[j * (p + 1) + i].abs();
                 let order = (i + j).min(4);
                 sums.value[order] += c;
-                if i > 0 {
-                    sums.by_s[order] += if i > 1 { c * i as f64 } else { c };
-                }
-                if j > 0 {
-                    sums.by_t[order] += if j > 1 { c * j as f64 } else { c };
-                }
+                sums.by_s[order] += c * i as f64;
+                sums.by_t[order] += c * j as f64;
             }
         }
         sums
@@ -78,24 +90,56 @@ type Low<S> = [F<S>; 10];
 fn low<S: Simd, H: Shape>(shape: H, coefficients: &[F<S>]) -> Low<S> {
     let [p, q] = shape.degree();
     let zero = coefficients[0].with(0.0);
-    TERMS.map(|(i, j)| if i <= p && j <= q { coefficients[j * (p + 1) + i] } else { zero })
+    let mut low = [zero; 10];
+    if p == 3 && q == 3 {
+        let c = coefficients;
+        return [c[0], c[1], c[4], c[2], c[5], c[8], c[3], c[6], c[9], c[12]];
+    }
+    for (low, (i, j)) in low.iter_mut().zip(TERMS) {
+        if i <= p && j <= q {
+            *low = coefficients[j * (p + 1) + i];
+        }
+    }
+    low
+}
+
+/// One mixed term of a product.
+#[inline(always)]
+fn mix<S: Simd>(a: &Low<S>, b: &Low<S>, i: usize, j: usize) -> F<S> {
+    a[i] * b[j] + a[j] * b[i]
 }
 
 /// The terms up to order 3 of a product.
 #[inline(always)]
 fn product<S: Simd>(a: &Low<S>, b: &Low<S>) -> Low<S> {
-    let mix = |i: usize, j: usize| a[i] * b[j] + a[j] * b[i];
     [
         a[0] * b[0],
-        mix(0, 1),
-        mix(0, 2),
-        mix(0, 3) + a[1] * b[1],
-        mix(0, 4) + mix(1, 2),
-        mix(0, 5) + a[2] * b[2],
-        mix(0, 6) + mix(1, 3),
-        mix(0, 7) + mix(1, 4) + mix(2, 3),
-        mix(0, 8) + mix(1, 5) + mix(2, 4),
-        mix(0, 9) + mix(2, 5),
+        mix(a, b, 0, 1),
+        mix(a, b, 0, 2),
+        mix(a, b, 0, 3) + a[1] * b[1],
+        mix(a, b, 0, 4) + mix(a, b, 1, 2),
+        mix(a, b, 0, 5) + a[2] * b[2],
+        mix(a, b, 0, 6) + mix(a, b, 1, 3),
+        mix(a, b, 0, 7) + mix(a, b, 1, 4) + mix(a, b, 2, 3),
+        mix(a, b, 0, 8) + mix(a, b, 1, 5) + mix(a, b, 2, 4),
+        mix(a, b, 0, 9) + mix(a, b, 2, 5),
+    ]
+}
+
+/// The terms up to order 3 of half a square.
+#[inline(always)]
+fn half_square<S: Simd>(a: &Low<S>) -> Low<S> {
+    [
+        a[0] * a[0] * 0.5,
+        a[0] * a[1],
+        a[0] * a[2],
+        a[0] * a[3] + a[1] * a[1] * 0.5,
+        a[0] * a[4] + a[1] * a[2],
+        a[0] * a[5] + a[2] * a[2] * 0.5,
+        a[0] * a[6] + a[1] * a[3],
+        a[0] * a[7] + a[1] * a[4] + a[2] * a[3],
+        a[0] * a[8] + a[1] * a[5] + a[2] * a[4],
+        a[0] * a[9] + a[2] * a[5],
     ]
 }
 
@@ -117,6 +161,41 @@ fn circle_bound<S: Simd>(y: F<S>, z: F<S>, k: F<S>) -> F<S> {
     n / (one + (one - k * n).max(one * 0.0).sqrt())
 }
 
+/// What bounds a derivative of the distance.
+struct Slope<S: Simd> {
+    /// Bounds of |y| and |z|.
+    of: [F<S>; 2],
+    bw: F<S>,
+    inverse_w: F<S>,
+    inverse_d: F<S>,
+    k2: F<S>,
+    difference: F<S>,
+}
+
+impl<S: Simd> Slope<S> {
+    /// From bounds of the derivatives of q and of the coordinates.
+    #[inline(always)]
+    fn bound(&self, q: F<S>, derivative: &[F<S>; 3]) -> F<S> {
+        let [y, z] = self.of;
+        let w = (derivative[2] + self.k2 * (y * derivative[1] + z * derivative[2])) * self.inverse_w;
+        (q + self.k2 * z * derivative[2] + self.difference * self.bw * w) * self.inverse_d
+    }
+}
+
+/// The sum over orders 2 and more.
+#[inline(always)]
+fn above_one<S: Simd>(a: &[F<S>; 5]) -> F<S> {
+    a[2] + a[3] + a[4]
+}
+
+/// Bound of the half-angle parameter of (y, z) on a circle of curvature `k` >= 0, |c| <= `c`.
+#[inline(always)]
+fn extent<S: Simd>(y: F<S>, z: F<S>, c: F<S>, k: F<S>) -> F<S> {
+    let zero = y.with(0.0);
+    let left = y.with(1.0) - k * (z + c) * 0.5;
+    zero.less(left, y / left, y.with(f64::INFINITY)) * UP
+}
+
 /// The numbers of the leaf's torus, in the order of `LeafTorus::from_numbers`. `center` is the node's centre;
 /// `scratch` has room for two nets.
 #[inline(always)]
@@ -130,21 +209,19 @@ pub(crate) fn osculate<S: Simd, H: Shape>(
     slack: F<S>,
 ) -> [F<S>; LEAF_NUMBERS] {
     let n = shape.count();
-    let [p, q] = shape.degree();
+    let [p, _] = shape.degree();
     let zero = F::splat(simd, 0.0);
     let one = F::splat(simd, 1.0);
     let (powers_of, local) = scratch.split_at_mut(shape.size());
     powers(shape, net, matrices, powers_of);
-    let coefficient = |i: usize, j: usize| {
-        if i > p || j > q {
-            return F3::new(zero, zero, zero);
-        }
-        let at = j * (p + 1) + i;
-        F3::new(powers_of[at], powers_of[n + at], powers_of[2 * n + at])
-    };
 
     // The point and its derivatives (halved where taken twice the same way).
-    let mut jet = TERMS.map(|(i, j)| coefficient(i, j));
+    let (lx, ly, lz) =
+        (low(shape, &powers_of[..n]), low(shape, &powers_of[n..2 * n]), low(shape, &powers_of[2 * n..3 * n]));
+    let mut jet = [F3::new(zero, zero, zero); 6];
+    for k in 0..6 {
+        jet[k] = F3::new(lx[k], ly[k], lz[k]);
+    }
     if H::RATIONAL {
         let weight = low(shape, &powers_of[3 * n..4 * n]);
         let inverse = one / weight[0];
@@ -156,17 +233,15 @@ pub(crate) fn osculate<S: Simd, H: Shape>(
         jet[4] = (jet[4] - jet[0] * weight[4] - jet[1] * weight[2] - jet[2] * weight[1]) * inverse;
         jet[5] = (jet[5] - jet[0] * weight[5] - jet[2] * weight[2]) * inverse;
     }
-    let [middle, su, sv, suu, suv, svv, ..] = jet;
+    let [middle, su, sv, suu, suv, svv] = jet;
 
     // Principal curvatures and directions.
     let cross = su.cross(sv);
     let (uu, vv, cc) = (su.dot(su), sv.dot(sv), cross.dot(cross));
     let tiny = uu * vv * 1e-24;
-    let regular = |yes: F<S>, no: F<S>| tiny.less(cc, yes, no);
     let (inverse_u, inverse_c) = (one / uu.sqrt(), one / cc.sqrt());
-    let pick = |yes: F3<S>, no: F3<S>| F3::less(tiny, cc, yes, no);
-    let t1 = pick(su * inverse_u, F3::new(one, zero, zero));
-    let normal = pick(cross * inverse_c, F3::new(zero, zero, one));
+    let t1 = F3::less(tiny, cc, su * inverse_u, F3::new(one, zero, zero));
+    let normal = F3::less(tiny, cc, cross * inverse_c, F3::new(zero, zero, one));
     let t2 = normal.cross(t1);
     let (along, across) = (sv.dot(t1), sv.dot(t2));
     let (e, f, g) = (suu.dot(normal) * 2.0, suv.dot(normal), svv.dot(normal) * 2.0);
@@ -175,7 +250,7 @@ pub(crate) fn osculate<S: Simd, H: Shape>(
     let c11 = e * inverse_u * inverse_u;
     let c12 = (fu - c11 * along) * inverse_across;
     let c22 = (g - along * (fu + fu - c11 * along)) * (inverse_across * inverse_across);
-    let (c11, c12, c22) = (regular(c11, zero), regular(c12, zero), regular(c22, zero));
+    let (c11, c12, c22) = (tiny.less(cc, c11, zero), tiny.less(cc, c12, zero), tiny.less(cc, c22, zero));
     let (half, mean) = ((c11 - c22) * 0.5, (c11 + c22) * 0.5);
     let radius = (half * half + c12 * c12).sqrt();
     let inverse = one / radius;
@@ -187,22 +262,26 @@ pub(crate) fn osculate<S: Simd, H: Shape>(
     let a1 = t1 * cos + t2 * sin;
     let a2 = normal.cross(a1);
     let limit = one * 1e30;
-    let curvature = |k: F<S>| k.min(limit).max(-limit);
-    let (k_high, k_low) = (curvature(mean + radius), curvature(mean - radius));
+    let (k_high, k_low) = ((mean + radius).min(limit).max(-limit), (mean - radius).min(limit).max(-limit));
 
-    // The tube along a1 or along a2: whichever torus is closer to the corners.
+    // The tube along a1 or along a2: whichever torus is closer to the corners, by the terms up to order 4.
     let corner_at = [0, p, n - p - 1, n - 1];
+    let mut corner_points = [middle; 4];
     let (mut along_first, mut along_second) = (zero, zero);
-    for at in corner_at {
-        let d = point(shape, net, at) - middle;
+    for at in 0..4 {
+        corner_points[at] = point(shape, net, corner_at[at]);
+        let d = corner_points[at] - middle;
         let (x, y, z) = (d.dot(a1), d.dot(a2), d.dot(normal));
-        let (w, _) = circle(y, z, k_low);
-        along_first = along_first.max(circle(x, w, k_high).0.abs());
-        let (w, _) = circle(x, z, k_high);
-        along_second = along_second.max(circle(y, w, k_low).0.abs());
+        let (bent_x, bent_y) = (k_high * x * x * 0.5, k_low * y * y * 0.5);
+        let (over_y, over_x) = (z - bent_y, z - bent_x);
+        let q = over_y - bent_x;
+        let difference = (k_high - k_low) * 0.5;
+        let z2 = z * z * 0.5;
+        along_first = along_first.max((q - k_low * z2 - difference * over_y * over_y).abs());
+        along_second = along_second.max((q - k_high * z2 + difference * over_x * over_x).abs());
     }
-    let tube = |first: F<S>, second: F<S>| along_second.less(along_first, second, first);
-    let (k1, k2) = (tube(k_high, k_low).rounded(), tube(k_low, k_high).rounded());
+    let k1 = along_second.less(along_first, k_low, k_high).rounded();
+    let k2 = along_second.less(along_first, k_high, k_low).rounded();
 
     // What is stored, and the frame that it decodes to.
     let stored_e1 = F3::less(along_second, along_first, a2, a1).rounded();
@@ -232,7 +311,7 @@ pub(crate) fn osculate<S: Simd, H: Shape>(
 
     // q, times the squared weight where there is one.
     let (half1, half2) = (k1 * 0.5, k2 * 0.5);
-    let (xx, yy) = (product(&xl, &xl), product(&yl, &yl));
+    let (xx, yy) = (half_square(&xl), half_square(&yl));
     let (half1_abs, half2_abs) = (half1.abs(), half2.abs());
     let mut terms = zl;
     let (mut q_tail, mut q_tail_s, mut q_tail_t) = (z.value[4], z.by_s[4], z.by_t[4]);
@@ -258,16 +337,14 @@ pub(crate) fn osculate<S: Simd, H: Shape>(
     let scale = if H::RATIONAL { most_weight } else { one };
     let noise = slack * scale * (scale + (half1_abs + half2_abs) * reach * 2.0) * 4.0;
     let (mut q_sum, mut q_s, mut q_t) = (q_tail + noise, q_tail_s + noise, q_tail_t + noise);
-    for (k, (i, j)) in TERMS.into_iter().enumerate() {
-        let term = (terms[k] - half1 * xx[k] - half2 * yy[k]).abs();
-        q_sum += term;
-        if i > 0 {
-            q_s += term * i as f64;
-        }
-        if j > 0 {
-            q_t += term * j as f64;
-        }
+    let mut term = [zero; 10];
+    for k in 0..10 {
+        term[k] = (terms[k] - k1 * xx[k] - k2 * yy[k]).abs();
     }
+    let [t00, t10, t01, t20, t11, t02, t30, t21, t12, t03] = term;
+    q_sum += ((t00 + t10) + (t01 + t20)) + ((t11 + t02) + (t30 + t21)) + (t12 + t03);
+    q_s += t10 + t11 + t12 + (t20 + t21) * 2.0 + t30 * 3.0;
+    q_t += t01 + t11 + t21 + (t02 + t12) * 2.0 + t03 * 3.0;
     let mut bound = [total(&x.value), total(&y.value), total(&z.value)];
     let mut bound_s = [total(&x.by_s), total(&y.by_s), total(&z.by_s)];
     let mut bound_t = [total(&x.by_t), total(&y.by_t), total(&z.by_t)];
@@ -294,48 +371,38 @@ pub(crate) fn osculate<S: Simd, H: Shape>(
     let distance = (q_sum + (flat + k1_abs * better * better) * 0.5).min(crude);
     let turn_w = one - k2_abs * bw;
     let turn_d = one - k1_abs * distance;
-    let (inverse_w, inverse_d) = (one / turn_w, one / turn_d);
-    let derivative = |q: F<S>, b: &[F<S>; 3]| {
-        let w = (b[2] + k2_abs * (by * b[1] + bz * b[2])) * inverse_w;
-        (q + k2_abs * bz * b[2] + difference * bw * w) * inverse_d
-    };
-    let (d_s, d_t) = (derivative(q_s, &bound_s), derivative(q_t, &bound_t));
+    let slope = Slope { of: [by, bz], bw, inverse_w: one / turn_w, inverse_d: one / turn_d, k2: k2_abs, difference };
+    let (d_s, d_t) = (slope.bound(q_s, &bound_s), slope.bound(q_t, &bound_t));
 
     // Against the tangents, each times the weight: at the middle, and how far they stray.
-    let vector = |k: usize| F3::new(xl[k], yl[k], zl[k]);
-    let (main_s, main_t) = (vector(1), vector(2));
-    let stray = |sums: [&[F<S>; 5]; 3], weight: F<S>| {
-        let rest = |a: &[F<S>; 5]| a[2] + a[3] + a[4];
-        rest(sums[0]) + rest(sums[1]) + rest(sums[2]) + (bx + by + bz) * weight
-    };
-    let stray_s = stray([&x.by_s, &y.by_s, &z.by_s], weight_s);
-    let stray_t = stray([&x.by_t, &y.by_t, &z.by_t], weight_t);
+    let main_s = F3::new(xl[1], yl[1], zl[1]);
+    let main_t = F3::new(xl[2], yl[2], zl[2]);
+    let mut stray_s = above_one(&x.by_s) + above_one(&y.by_s) + above_one(&z.by_s);
+    let mut stray_t = above_one(&x.by_t) + above_one(&y.by_t) + above_one(&z.by_t);
+    if H::RATIONAL {
+        stray_s += (bx + by + bz) * weight_s;
+        stray_t += (bx + by + bz) * weight_t;
+    }
     let cross = main_s.cross(main_t);
     let (long_s, long_t) = (main_s.dot(main_s).sqrt(), main_t.dot(main_t).sqrt());
     let area = cross.dot(cross).sqrt() - long_s * stray_t - long_t * stray_s - stray_s * stray_t;
     let sine = (d_s * (long_t + stray_t) + d_t * (long_s + stray_s)) * scale / area;
     let unbounded = one * f64::INFINITY;
     let mut sine = sine + 1e-15;
-    for condition in [area, turn_w, turn_d, one - sine] {
-        sine = zero.less(condition, sine, unbounded);
-    }
+    sine = zero.less(area.min(turn_w).min(turn_d), sine, unbounded);
+    sine = sine.less(one, sine, unbounded);
 
     // Extents: the half-angle parameter differs from the coordinate by a factor 1 / (1 - eta).
-    let extent = |y: F<S>, z: F<S>, c: F<S>, k: F<S>| {
-        let left = one - k * (z + c) * 0.5;
-        zero.less(left, y / left, unbounded) * UP
-    };
     let half_1 = extent(bx, bw, crude, k1_abs);
     let half_2 = extent(by, bz, bw, k2_abs);
 
     let mut out = [zero; LEAF_NUMBERS];
-    let mut set = |at: usize, v: F3<S>| (out[at], out[at + 1], out[at + 2]) = (v.x, v.y, v.z);
-    set(0, stored_point);
-    set(3, stored_e1);
-    set(6, stored_normal);
+    (out[0], out[1], out[2]) = (stored_point.x, stored_point.y, stored_point.z);
+    (out[3], out[4], out[5]) = (stored_e1.x, stored_e1.y, stored_e1.z);
+    (out[6], out[7], out[8]) = (stored_normal.x, stored_normal.y, stored_normal.z);
     (out[9], out[10], out[11], out[12]) = (k1, k2, half_1, half_2);
-    for (at, corner) in corner_at.into_iter().enumerate() {
-        let d = point(shape, net, corner) - contact;
+    for at in 0..4 {
+        let d = corner_points[at] - contact;
         let (w, t) = circle(d.dot(e2), d.dot(normal), k2);
         let (_, s) = circle(d.dot(e1), w, k1);
         (out[13 + 2 * at], out[14 + 2 * at]) = (s, t);

@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 
 use glam::{DVec2, DVec3};
 
-use super::build::{Instructions, Recipe, Slots as Target, direction};
+use super::build::{Instructions, Matrices, Recipe, Slots as Target, direction};
 use super::net::plain_net;
 use super::node::Node;
 use super::slots::Slots;
@@ -72,14 +72,14 @@ impl std::ops::AddAssign for Memory {
 
 impl PatchTree {
     /// The tree of a patch with 2^height x 2^height leaves; only its root is built. `height` is at most 15.
-    pub(crate) fn new(patch: &BezierPatch, height: u32) -> Self {
+    pub(crate) fn new(patch: &BezierPatch, height: u32, matrices: Matrices) -> Self {
         let bounds = patch.bounds();
         let origin = bounds.center();
         let net = plain_net(patch, origin);
-        let recipe = Recipe::new(patch.degree, patch.rational, 0.5 * bounds.size().max_element());
+        let recipe = Recipe::new(patch.degree, patch.rational, 0.5 * bounds.size().max_element(), matrices);
         let mut root = [Node::default()];
         let target = Target { levels: vec![&mut root], tori: &mut [] };
-        recipe.build(&net, 0, target, Instructions::Plain);
+        recipe.build(&net, 0, target, Instructions::Best);
         Self {
             low: patch.low,
             high: patch.high,
@@ -131,14 +131,10 @@ impl PatchTree {
 
     /// The two children and four grandchildren of a node at an even depth.
     fn build_block(&self, above: u32) -> [Node; 6] {
-        let mut nodes = [Node::default(); 7];
-        let (root, rest) = nodes.split_at_mut(1);
-        let (children, grandchildren) = rest.split_at_mut(2);
-        let net = self.subnet(above);
-        let target = Target { levels: vec![root, children, grandchildren], tori: &mut [] };
-        self.recipe.build(&net, above.ilog2() as usize, target, Instructions::Best);
         let mut block = [Node::default(); 6];
-        block.copy_from_slice(&nodes[1..]);
+        let (children, grandchildren) = block.split_at_mut(2);
+        let target = Target { levels: vec![&mut [], children, grandchildren], tori: &mut [] };
+        self.recipe.build(&self.subnet(above), above.ilog2() as usize, target, Instructions::Best);
         block
     }
 
@@ -156,10 +152,8 @@ impl PatchTree {
         let above = index >> 2;
         let make = || {
             let mut tori = [LeafTorus::default(); 4];
-            let mut nodes = [Node::default(); 7];
-            let (root, rest) = nodes.split_at_mut(1);
-            let (children, grandchildren) = rest.split_at_mut(2);
-            let target = Target { levels: vec![root, children, grandchildren], tori: &mut tori };
+            let mut leaves = [Node::default(); 4];
+            let target = Target { levels: vec![&mut [], &mut [], &mut leaves], tori: &mut tori };
             self.recipe.build(&self.subnet(above), above.ilog2() as usize, target, Instructions::Best);
             tori
         };
@@ -250,13 +244,12 @@ impl PatchTree {
         let blocks: usize = self.blocks.iter().map(Slots::filled).sum();
         let torus_blocks: usize = self.tori.iter().map(Slots::filled).sum();
         let tables = |bytes: usize| bytes + self.blocks.capacity() * size_of::<Slots<[Node; 6]>>();
-        let nets = self.net.capacity() * size_of::<f64>();
         Memory {
             nodes: nodes.saturating_sub(1).max(1) + 6 * blocks,
             node_bytes: nodes * size_of::<Node>() + tables(self.blocks.iter().map(Slots::bytes).sum()),
             tori: tori + 4 * torus_blocks,
             torus_bytes: tori * size_of::<LeafTorus>() + tables(self.tori.iter().map(Slots::bytes).sum()),
-            other_bytes: size_of::<Self>() + nets + self.recipe.heap_bytes(),
+            other_bytes: size_of::<Self>() + self.net.capacity() * size_of::<f64>(),
         }
     }
 }

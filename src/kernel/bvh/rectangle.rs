@@ -145,3 +145,108 @@ pub(crate) fn separated(a: &Patch, b: &Patch, shift: DVec3, reach: f64) -> bool 
     }
     false
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::Random;
+    use super::*;
+
+    fn random(random: &mut Random) -> Rectangle {
+        let size = |r: &mut Random| if r.next() < 0.15 { 0.0 } else { 10.0_f64.powf(2.0 * r.signed() - 0.5) };
+        let half = [size(random), size(random)];
+        // Often parallel to the axes, where edges and faces line up.
+        let axes = if random.next() < 0.3 { [DVec3::Y, DVec3::Z] } else { [random.vector(), random.vector()] };
+        let center = random.vector() * if random.next() < 0.3 { 0.0 } else { 3.0 };
+        Rectangle::new(center, axes, half)
+    }
+
+    /// The least distance by the optimality conditions: each of the four coordinates is at either end or free.
+    fn brute_force(a: &Rectangle, b: &Rectangle) -> f64 {
+        let columns = [a.axes[0], a.axes[1], -b.axes[0], -b.axes[1]];
+        let half = [a.half[0], a.half[1], b.half[0], b.half[1]];
+        let offset = a.center - b.center;
+        let mut least = f64::INFINITY;
+        for state in 0..81 {
+            let states = [state % 3, state / 3 % 3, state / 9 % 3, state / 27];
+            let free: Vec<usize> = (0..4).filter(|&k| states[k] == 2).collect();
+            let mut x = [0.0; 4];
+            let mut fixed = offset;
+            for k in 0..4 {
+                if states[k] < 2 {
+                    x[k] = if states[k] == 0 { -half[k] } else { half[k] };
+                    fixed += columns[k] * x[k];
+                }
+            }
+            // Normal equations of the free ones, by elimination; dependent columns are covered by other states.
+            let n = free.len();
+            let mut m = vec![vec![0.0; n + 1]; n];
+            for (i, &p) in free.iter().enumerate() {
+                for (j, &q) in free.iter().enumerate() {
+                    m[i][j] = columns[p].dot(columns[q]);
+                }
+                m[i][n] = -columns[p].dot(fixed);
+            }
+            let mut regular = true;
+            for i in 0..n {
+                let best = (i..n).max_by(|&p, &q| m[p][i].abs().total_cmp(&m[q][i].abs())).unwrap();
+                m.swap(i, best);
+                if m[i][i].abs() < 1e-9 {
+                    regular = false;
+                    break;
+                }
+                for r in 0..n {
+                    if r != i {
+                        let f = m[r][i] / m[i][i];
+                        for c in i..=n {
+                            m[r][c] -= f * m[i][c];
+                        }
+                    }
+                }
+            }
+            if !regular {
+                continue;
+            }
+            for (i, &k) in free.iter().enumerate() {
+                x[k] = (m[i][n] / m[i][i]).clamp(-half[k], half[k]);
+            }
+            let d = (0..4).fold(offset, |d, k| d + columns[k] * x[k]);
+            least = least.min(d.length());
+        }
+        least
+    }
+
+    #[test]
+    fn the_distance_is_that_of_the_optimality_conditions() {
+        let mut numbers = Random(7);
+        let mut touching = 0;
+        for _ in 0..4000 {
+            let (a, b) = (random(&mut numbers), random(&mut numbers));
+            let (distance, expected) = (a.distance(&b), brute_force(&a, &b));
+            let scale = a.center.distance(b.center) + a.half[0] + a.half[1] + b.half[0] + b.half[1];
+            assert!((distance - expected).abs() < 1e-7 * scale, "{distance} {expected} {a:?} {b:?}");
+            assert!((distance - b.distance(&a)).abs() < 1e-12 * scale);
+            touching += usize::from(distance == 0.0);
+        }
+        assert!((200..2000).contains(&touching), "{touching}");
+    }
+
+    #[test]
+    fn separated_is_never_wrong_and_rarely_shy() {
+        let mut numbers = Random(8);
+        let (mut apart, mut missed) = (0, 0);
+        for _ in 0..20_000 {
+            let (a, b) = (random(&mut numbers), random(&mut numbers));
+            let distance = a.distance(&b);
+            let reach = distance * (0.5 + numbers.next());
+            let patch = |r: &Rectangle| Patch { axes: r.axes, half: r.half };
+            let says = separated(&patch(&a), &patch(&b), b.center - a.center, reach);
+            assert!(!says || distance > reach * (1.0 - 1e-9), "{a:?} {b:?} {reach}");
+            if distance > reach {
+                apart += 1;
+                missed += usize::from(!says);
+            }
+        }
+        // A corner against a corner or an edge has no axis of its own; that is the price of the quick test.
+        assert!(5 * missed < apart, "{missed} of {apart}");
+    }
+}

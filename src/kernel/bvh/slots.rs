@@ -7,12 +7,13 @@ use std::sync::OnceLock;
 const PAGE: usize = 256;
 
 type Cell<T> = OnceLock<Box<T>>;
+type Page<T> = OnceLock<Box<[Cell<T>]>>;
 
 /// A lazily filled array.
 #[derive(Debug)]
 pub(crate) struct Slots<T> {
     length: usize,
-    pages: Box<[OnceLock<Box<[Cell<T>]>>]>,
+    pages: Box<[Page<T>]>,
 }
 
 impl<T> Slots<T> {
@@ -37,9 +38,7 @@ impl<T> Slots<T> {
     /// Bytes on the heap: the page table, the pages, the values.
     pub fn bytes(&self) -> usize {
         let pages: usize = self.pages.iter().filter_map(OnceLock::get).map(|page| page.len()).sum();
-        self.pages.len() * size_of::<OnceLock<Box<[Cell<T>]>>>()
-            + pages * size_of::<Cell<T>>()
-            + self.filled() * size_of::<T>()
+        self.pages.len() * size_of::<Page<T>>() + pages * size_of::<Cell<T>>() + self.filled() * size_of::<T>()
     }
 }
 

