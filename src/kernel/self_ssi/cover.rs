@@ -27,8 +27,9 @@ use crate::kernel::job::Job;
 const GROWTH: f64 = 3.25;
 /// The smallest box.
 const SMALLEST: f64 = 1e-7;
-/// Coincidence is looked for in boxes below this size.
+/// Coincidence is looked for in boxes between these sizes: in smaller ones being close proves nothing.
 const COINCIDENCE_CELL: f64 = 1.0 / 24.0;
+const FINEST_COINCIDENCE: f64 = 1.0 / 1024.0;
 
 /// A node of the ternary tree with its domain clipped, or a box below the grid.
 #[derive(Clone, Copy, Debug)]
@@ -295,7 +296,7 @@ impl<'a> Search<'a> {
             Some(&known) => known,
             None => {
                 self.found.windows += 1;
-                let proved = injective(&self.hull(rect));
+                let proved = injective(&self.sheet.frames(rect));
                 self.injective.insert(k, proved);
                 if !proved {
                     self.found.failed_windows += 1;
@@ -319,14 +320,9 @@ impl<'a> Search<'a> {
             .filter(|(at, _)| around.contains(*at));
         let only = inside.next();
         let proved = match (only, inside.next()) {
-            (Some((_, m)), None) if m.kind == MiterKind::CrossCap => cross_cap(
-                &around,
-                &self.sheet.hull(&around),
-                &self.sheet.second_hull(&around),
-                m.null(),
-                m.first,
-                m.second,
-            ),
+            (Some((_, m)), None) if m.kind == MiterKind::CrossCap => {
+                cross_cap(&around, &self.sheet.jets(&around), m.null(), m.first, m.second)
+            }
             _ => false,
         };
         self.capped_window.insert(key(rect), proved);
@@ -387,7 +383,7 @@ impl<'a> Search<'a> {
         if self.in_cusp_strip(&a.rect, &b.rect) {
             return;
         }
-        if size < COINCIDENCE_CELL
+        if (FINEST_COINCIDENCE..COINCIDENCE_CELL).contains(&size)
             && let (Some(pa), Some(pb)) = (self.sheet.single_piece(&a.rect), self.sheet.single_piece(&b.rect))
             && let Some(met) = self.coincide(&a.rect, pa, &b.rect, pb)
         {

@@ -61,6 +61,32 @@ pub(crate) struct Hull {
     pub dv: Vec<DVec3>,
 }
 
+/// Bounds of Su, Sv, Suu, Suv, Svv together.
+#[derive(Clone, Debug)]
+pub(crate) enum Jets {
+    /// The five derivatives at each point lie in the convex hull of these five-tuples.
+    Joint(Vec<[DVec3; 5]>),
+    /// Each derivative lies in the convex hull of its own points.
+    Apart([Vec<DVec3>; 5]),
+}
+
+impl Jets {
+    /// The range of `y . (c0 Su + c1 Sv + c2 Suu + c3 Suv + c4 Svv)`.
+    pub fn range(&self, y: DVec3, c: [f64; 5]) -> [f64; 2] {
+        match self {
+            Self::Joint(points) => points.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], d| {
+                let value = (0..5).map(|k| c[k] * y.dot(d[k])).sum::<f64>();
+                [low.min(value), high.max(value)]
+            }),
+            Self::Apart(points) => (0..5).filter(|&k| c[k] != 0.0).fold([0.0; 2], |[low, high], k| {
+                let [a, b] = range(y, &points[k]);
+                let (a, b) = if c[k] >= 0.0 { (a * c[k], b * c[k]) } else { (b * c[k], a * c[k]) };
+                [low + a, high + b]
+            }),
+        }
+    }
+}
+
 /// Points around the second derivatives: uu, uv, vv.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SecondHull(pub [Vec<DVec3>; 3]);
@@ -160,6 +186,90 @@ impl Sheet {
         }
     }
 
+    /// Pairs (Su, Sv) in whose convex hull the pair of derivatives lies at every point of a rectangle.
+    pub fn frames(&self, rect: &Rect) -> Vec<[DVec3; 2]> {
+        let parts = self.parts(rect);
+        if !self.rational && parts.len() <= 4 * MANY {
+            let mut all = Vec::new();
+            for (piece, part) in &parts {
+                let pos: Vec<DVec3> = self.net(*piece, part).iter().map(|h| h.truncate()).collect();
+                let [p, q] = self.degree;
+                let du = elevated(&self.differences(&pos, 0, part.size().x), [p - 1, q], [p, q]);
+                let dv = elevated(&self.differences(&pos, 1, part.size().y), [p, q - 1], [p, q]);
+                all.extend(du.into_iter().zip(dv).map(|(a, b)| [a, b]));
+            }
+            return all;
+        }
+        let (mut du, mut dv) = (Vec::new(), Vec::new());
+        let mut all = Vec::new();
+        for (piece, part) in &parts {
+            let hull = self.hull_on(*piece, part);
+            if parts.len() <= MANY {
+                let (du, dv) = (corners(&hull.du), corners(&hull.dv));
+                all.extend(du.iter().flat_map(|&a| dv.iter().map(move |&b| [a, b])));
+            } else {
+                du.extend(corners(&hull.du));
+                dv.extend(corners(&hull.dv));
+            }
+        }
+        if parts.len() > MANY {
+            let (du, dv) = (corners(&du), corners(&dv));
+            all = du.iter().flat_map(|&a| dv.iter().map(move |&b| [a, b])).collect();
+        }
+        all
+    }
+
+    /// Bounds of the first and second derivatives over a rectangle of the surface.
+    pub fn jets(&self, rect: &Rect) -> Jets {
+        self.jets_of(&self.parts(rect))
+    }
+
+    /// The same on one piece, continued where the rectangle leaves it.
+    pub fn jets_on(&self, piece: usize, rect: &Rect) -> Jets {
+        self.jets_of(&[(piece, *rect)])
+    }
+
+    fn jets_of(&self, parts: &[(usize, Rect)]) -> Jets {
+        if self.rational {
+            let mut all: [Vec<DVec3>; 5] = Default::default();
+            for (piece, part) in parts {
+                let hull = self.hull_on(*piece, part);
+                all[0].extend(hull.du);
+                all[1].extend(hull.dv);
+                for (k, points) in self.second_hull_on(*piece, part).0.into_iter().enumerate() {
+                    all[2 + k].extend(points);
+                }
+            }
+            return Jets::Apart(all);
+        }
+        let [p, q] = self.degree;
+        let mut all = Vec::new();
+        for (piece, part) in parts {
+            let part = self.enlarged(*piece, part);
+            let size = part.size();
+            let pos: Vec<DVec3> = self.net(*piece, &part).iter().map(|h| h.truncate()).collect();
+            let (du, dv) = (self.differences(&pos, 0, size.x), self.differences(&pos, 1, size.y));
+            let uu = differences(&du, p, q + 1, 0, p - 1, size.x);
+            let uv = differences(&du, p, q + 1, 1, q, size.y);
+            let vv = differences(&dv, p + 1, q, 1, q - 1, size.y);
+            let nets = [
+                elevated(&du, [p - 1, q], [p, q]),
+                elevated(&dv, [p, q - 1], [p, q]),
+                if p > 1 { elevated(&uu, [p - 2, q], [p, q]) } else { vec![DVec3::ZERO; (p + 1) * (q + 1)] },
+                elevated(&uv, [p - 1, q - 1], [p, q]),
+                if q > 1 { elevated(&vv, [p, q - 2], [p, q]) } else { vec![DVec3::ZERO; (p + 1) * (q + 1)] },
+            ];
+            all.extend((0..(p + 1) * (q + 1)).map(|k| [0, 1, 2, 3, 4].map(|n: usize| nets[n][k])));
+        }
+        Jets::Joint(all)
+    }
+
+    /// Tiny rectangles enlarged, because second differences of nearly equal control points are rounding.
+    fn enlarged(&self, piece: usize, rect: &Rect) -> Rect {
+        let half = (rect.size() * 0.5).max(self.pieces[piece].size() * 1e-4);
+        Rect::new(rect.center() - half, rect.center() + half)
+    }
+
     /// Bounds of the second derivatives over a rectangle of the surface.
     pub fn second_hull(&self, rect: &Rect) -> SecondHull {
         let mut all = SecondHull::default();
@@ -171,12 +281,9 @@ impl Sheet {
         all
     }
 
-    /// Bounds of the second derivatives over a rectangle on one piece. Tiny rectangles are enlarged, because second
-    /// differences of nearly equal control points are rounding.
-    pub fn second_hull_on(&self, piece: usize, rect: &Rect) -> SecondHull {
-        let least = self.pieces[piece].size() * 1e-4;
-        let half = (rect.size() * 0.5).max(least);
-        let rect = &Rect::new(rect.center() - half, rect.center() + half);
+    /// Bounds of the second derivatives over a rectangle on one piece.
+    fn second_hull_on(&self, piece: usize, rect: &Rect) -> SecondHull {
+        let rect = &self.enlarged(piece, rect);
         let net = self.net(piece, rect);
         let size = rect.size();
         if !self.rational {
@@ -262,6 +369,30 @@ fn differences(net: &[DVec3], width: usize, height: usize, direction: usize, deg
     let factor = degree as f64 / length;
     let (w, h, step) = if direction == 0 { (width - 1, height, 1) } else { (width, height - 1, width) };
     (0..w * h).map(|k| (k / w) * width + k % w).map(|at| (net[at + step] - net[at]) * factor).collect()
+}
+
+/// A net of degrees `from` written at the higher degrees `to`.
+fn elevated(net: &[DVec3], from: [usize; 2], to: [usize; 2]) -> Vec<DVec3> {
+    let mut rows: Vec<Vec<DVec3>> = net.chunks_exact(from[0] + 1).map(<[DVec3]>::to_vec).collect();
+    let blend = |a: DVec3, b: DVec3, i: usize, n: usize| a.lerp(b, 1.0 - i as f64 / n as f64);
+    for n in from[0] + 1..=to[0] {
+        for row in &mut rows {
+            let last = row[n - 1];
+            row.push(last);
+            for i in (1..n).rev() {
+                row[i] = blend(row[i - 1], row[i], i, n);
+            }
+        }
+    }
+    for n in from[1] + 1..=to[1] {
+        rows.push(rows[n - 1].clone());
+        for j in (1..n).rev() {
+            for i in 0..rows[j].len() {
+                rows[j][i] = blend(rows[j - 1][i], rows[j][i], j, n);
+            }
+        }
+    }
+    rows.concat()
 }
 
 /// The corners of the box around points.

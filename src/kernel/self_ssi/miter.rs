@@ -82,7 +82,7 @@ pub(crate) fn find(sheet: &Sheet, job: &Job) -> Miters {
                 continue;
             }
             let hull = sheet.hull_on(piece, &rect);
-            if window::injective(&hull) || regular(sheet, &hull) {
+            if regular(sheet, &hull) {
                 continue;
             }
             if decided(sheet, piece, &rect, &mut out, job) {
@@ -170,14 +170,7 @@ fn decided(sheet: &Sheet, piece: usize, rect: &Rect, out: &mut Miters, job: &Job
     if generic {
         let around = rect.union(&Rect::new(m, m)).grown(0.02);
         let null = DVec2::from_angle(y[2]);
-        let alone = window::cross_cap(
-            &around,
-            &sheet.hull_on(piece, &around),
-            &sheet.second_hull_on(piece, &around),
-            null,
-            jet.d,
-            jet.dd,
-        );
+        let alone = window::cross_cap(&around, &sheet.jets_on(piece, &around), null, jet.d, jet.dd);
         if here && !known && (alone || size < 1e-3) {
             let kind = MiterKind::CrossCap;
             out.points.push(MiterPoint { at: m, phi: y[2], kind, first: jet.d, second: jet.dd, split: [0.0; 3] });
@@ -330,5 +323,30 @@ fn degenerate(sheet: &Sheet, y: [f64; 3], frame: &DMat3) -> (MiterKind, [f64; 3]
         (MiterKind::TwoBranches, along.into())
     } else {
         (MiterKind::Isolated, [0.0; 3])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kernel::geom::{Knots, Surface};
+
+    #[test]
+    fn a_cusp_edge_is_one_curve_and_no_points() {
+        // (u^2, u^3, v) over [-1, 1] x [0, 1].
+        let k = Knots::bezier(3, 0.0, 1.0).unwrap();
+        // Bezier ordinates over [-1, 1] of u^2 and u^3.
+        let (squares, cubes) = ([1.0, -1.0 / 3.0, -1.0 / 3.0, 1.0], [-1.0, 1.0, -1.0, 1.0]);
+        let points = (0..16).map(|at| DVec3::new(squares[at % 4], cubes[at % 4], (at / 4) as f64 / 3.0)).collect();
+        let surface = Surface::new(k.clone(), k, points, None).unwrap();
+        let sheet = Sheet::new(&surface, 1e-11);
+        let (y, value) = newton(&sheet, DVec2::new(0.52, 0.3)).unwrap();
+        println!("{y:?} {value:?}");
+        let found = find(&sheet, &Job::new());
+        assert_eq!((found.points.len(), found.cusps.len(), found.open.len()), (0, 1, 0), "{} cells", found.cells);
+        let edge = &found.cusps[0];
+        assert!(edge.iter().all(|p| (p.x - 0.5).abs() < 1e-9));
+        let ends = [edge[0].y, edge[edge.len() - 1].y];
+        assert_eq!((ends[0].min(ends[1]), ends[0].max(ends[1])), (0.0, 1.0));
     }
 }

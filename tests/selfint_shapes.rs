@@ -1,0 +1,276 @@
+//! Self-intersections of surfaces with known answers: closed forms of double curves, miter points close together,
+//! closed and rational surfaces, surfaces without any, and bad input.
+
+#![allow(clippy::unwrap_used, reason = "a test helper may stop the test")]
+
+use std::time::Instant;
+
+use glam::{DMat3, DQuat, DVec2, DVec3};
+use patchwright::kernel::geom::{Knots, Surface};
+use patchwright::kernel::job::Job;
+use patchwright::kernel::self_ssi::{SelfIntersectOptions, SelfIntersection, self_intersect};
+use patchwright::kernel::ssi::result::{CurveEnd, CurveKind, IntersectionCurve};
+
+/// Solves the interpolation problem of one direction: rows of basis values at the Greville abscissae.
+fn interpolate_line(knots: &Knots, values: &[DVec3]) -> Vec<DVec3> {
+    let n = knots.control_count();
+    let mut rows: Vec<(Vec<f64>, DVec3)> = knots
+        .greville()
+        .iter()
+        .zip(values)
+        .map(|(&t, &value)| {
+            let basis = knots.basis(t, 0);
+            let mut row = vec![0.0; n];
+            for i in 0..=knots.degree() {
+                row[basis.first + i] = basis.d[0][i];
+            }
+            (row, value)
+        })
+        .collect();
+    for c in 0..n {
+        let pivot = (c..n).max_by(|&a, &b| rows[a].0[c].abs().total_cmp(&rows[b].0[c].abs())).unwrap();
+        rows.swap(c, pivot);
+        for r in c + 1..n {
+            let m = rows[r].0[c] / rows[c].0[c];
+            if m != 0.0 {
+                for k in c..n {
+                    let x = rows[c].0[k];
+                    rows[r].0[k] -= m * x;
+                }
+                let x = rows[c].1;
+                rows[r].1 -= x * m;
+            }
+        }
+    }
+    let mut out = vec![DVec3::ZERO; n];
+    for c in (0..n).rev() {
+        let sum: DVec3 = (c + 1..n).map(|k| out[k] * rows[c].0[k]).sum();
+        out[c] = (rows[c].1 - sum) / rows[c].0[c];
+    }
+    out
+}
+
+/// The spline through `f` at the Greville abscissae: exact where `f` is a polynomial of no higher degree.
+fn interpolate(u: &Knots, v: &Knots, f: impl Fn(f64, f64) -> DVec3) -> Surface {
+    let (gu, gv) = (u.greville(), v.greville());
+    let rows: Vec<Vec<DVec3>> =
+        gv.iter().map(|&t| interpolate_line(u, &gu.iter().map(|&s| f(s, t)).collect::<Vec<_>>())).collect();
+    let (nu, nv) = (gu.len(), gv.len());
+    let mut points = vec![DVec3::ZERO; nu * nv];
+    for i in 0..nu {
+        let column = interpolate_line(v, &rows.iter().map(|row| row[i]).collect::<Vec<_>>());
+        for (j, p) in column.into_iter().enumerate() {
+            points[j * nu + i] = p;
+        }
+    }
+    Surface::new(u.clone(), v.clone(), points, None).unwrap()
+}
+
+fn square() -> Knots {
+    Knots::bezier(3, -1.0, 1.0).unwrap()
+}
+
+fn spans(n: usize) -> Knots {
+    let breaks: Vec<f64> = (0..=n).map(|k| -1.0 + 2.0 * k as f64 / n as f64).collect();
+    Knots::clamped(3, &breaks, 1).unwrap()
+}
+
+/// A rigid motion in general position.
+fn turned(p: DVec3) -> DVec3 {
+    DMat3::from_quat(DQuat::from_axis_angle(DVec3::new(0.3, 1.0, -0.7).normalize(), 1.1)) * p
+        + DVec3::new(0.2, -0.4, 0.9)
+}
+
+/// The domain turned by an angle, so that nothing runs along u or v.
+fn spun(u: f64, v: f64) -> DVec2 {
+    DVec2::from_angle(0.4).rotate(DVec2::new(u, v)) + DVec2::new(0.03, -0.05)
+}
+
+fn solve(name: &str, surface: &Surface) -> SelfIntersection {
+    let started = Instant::now();
+    let found = self_intersect(surface, 0, &SelfIntersectOptions::default(), &Job::new()).unwrap();
+    let r = &found.result;
+    println!(
+        "{name}: {:.1} ms, complete {}, {} curves, {} miters, {} unresolved {:?}, {:?}",
+        started.elapsed().as_secs_f64() * 1e3,
+        r.complete,
+        r.curves.len(),
+        r.miters.len(),
+        r.unresolved.len(),
+        r.unresolved.first(),
+        found.evidence
+    );
+    for c in &r.curves {
+        println!("   {:?} {:?} {} points, bound {:.1e}", c.kind, c.ends, c.points.len(), c.error_bound);
+    }
+    for curve in &r.curves {
+        for p in &curve.points {
+            let gap = surface.eval(p.uv).distance(surface.eval(p.st));
+            assert!(gap <= 1e-11 * surface.bounds().diagonal(), "{name}: {gap}");
+        }
+    }
+    found
+}
+
+fn curves(found: &SelfIntersection) -> Vec<&IntersectionCurve> {
+    found.result.curves.iter().filter(|c| c.kind == CurveKind::SelfIntersection).collect()
+}
+
+/// The family (x, y^2, y^3 + c(x) y): double points are (x, +-y) with y^2 = -c(x), miter points the zeros of c.
+fn ridge(c: impl Fn(f64) -> f64) -> impl Fn(f64, f64) -> DVec3 {
+    move |u, v| turned(DVec3::new(u, v * v, v * v * v + c(u) * v))
+}
+
+/// Pulls a surface of a polynomial of degree 3 through a turned domain: the degree rises to 6 x 6.
+fn sextic() -> Knots {
+    Knots::bezier(6, -1.0, 1.0).unwrap()
+}
+
+#[test]
+fn pairs_of_miter_points_however_close() {
+    for a in [0.6, 0.05, 0.005, 0.0005] {
+        // Between the two, an arc whose preimages are two half circles.
+        let arc = ridge(move |x| x * x - a * a);
+        for (name, surface) in [
+            ("arc", interpolate(&square(), &square(), &arc)),
+            (
+                "arc, turned domain",
+                interpolate(&sextic(), &sextic(), |u, v| {
+                    let p = spun(u, v);
+                    arc(p.x, p.y)
+                }),
+            ),
+        ] {
+            let found = solve(&format!("{name} {a}"), &surface);
+            assert!(found.result.complete);
+            assert_eq!((curves(&found).len(), found.result.miters.len()), (1, 2));
+            assert_eq!(curves(&found)[0].ends, [CurveEnd::Miter; 2]);
+            if name == "arc" {
+                for p in &curves(&found)[0].points {
+                    assert!((p.uv.length() - a).abs() < 1e-9 && (p.uv.y + p.st.y).abs() < 1e-9, "{:?}", p);
+                }
+            }
+        }
+        // Away from the two, a branch on either side.
+        let open = ridge(move |x| a * a - x * x);
+        let found = solve(&format!("open {a}"), &interpolate(&square(), &square(), &open));
+        assert!(found.result.complete);
+        assert_eq!((curves(&found).len(), found.result.miters.len()), (2, 2));
+        for c in curves(&found) {
+            assert!(c.ends.contains(&CurveEnd::Miter) && c.ends.contains(&CurveEnd::Boundary));
+            for p in &c.points {
+                assert!((p.uv.x * p.uv.x - p.uv.y * p.uv.y - a * a).abs() < 1e-9);
+            }
+        }
+    }
+}
+
+#[test]
+fn three_miter_points() {
+    let surface = interpolate(&square(), &square(), ridge(|x| x * (x * x - 0.3)));
+    let found = solve("three", &surface);
+    assert!(found.result.complete);
+    assert_eq!((curves(&found).len(), found.result.miters.len()), (2, 3));
+    // The same over many patches, where it is no longer a polynomial of the pieces' degree.
+    let surface = interpolate(&spans(7), &spans(5), |u, v| {
+        let p = spun(u, v);
+        ridge(|x| x * (x * x - 0.3))(p.x, p.y)
+    });
+    let found = solve("three over 35 patches", &surface);
+    assert!(found.result.complete);
+    assert_eq!((curves(&found).len(), found.result.miters.len()), (2, 3));
+}
+
+#[test]
+fn a_closed_double_curve_and_its_size() {
+    // Two sheets of a folded strip that meet in a circle of radius r: (u, v) and (u, -v) with v near 0.7.
+    for r in [0.2, 0.02, 0.002] {
+        let fold = |u: f64, v: f64| {
+            // y = v^3 - v pairs v = +-1; near there z differs by a paraboloid that vanishes on a circle.
+            let w = v * v - 0.5;
+            DVec3::new(u, v * (v * v - 0.5), v * v + 0.25 * v * (u * u + 9.0 * w * w - r * r))
+        };
+        let k = |d| Knots::bezier(d, -1.0, 1.0).unwrap();
+        let surface = interpolate(&k(3), &k(6), fold);
+        let found = solve(&format!("loop {r}"), &surface);
+        for c in curves(&found) {
+            let first = c.points.first().unwrap();
+            println!("   {:?} {:?}", first.uv, first.st);
+        }
+    }
+}
+
+#[test]
+fn surfaces_without_self_intersection_are_proved_free() {
+    let wavy = interpolate(&spans(12), &spans(9), |u, v| DVec3::new(u, v, 0.3 * (5.0 * u).sin() * (4.0 * v).cos()));
+    let k = Knots::clamped(2, &[0.0, 0.25, 0.5, 0.75, 1.0], 2).unwrap();
+    let circle: Vec<(f64, f64, f64)> = {
+        let w = std::f64::consts::FRAC_1_SQRT_2;
+        vec![
+            (1.0, 0.0, 1.0),
+            (1.0, 1.0, w),
+            (0.0, 1.0, 1.0),
+            (-1.0, 1.0, w),
+            (-1.0, 0.0, 1.0),
+            (-1.0, -1.0, w),
+            (0.0, -1.0, 1.0),
+            (1.0, -1.0, w),
+            (1.0, 0.0, 1.0),
+        ]
+    };
+    let mut points = Vec::new();
+    let mut weights = Vec::new();
+    for &(a, b, w) in &circle {
+        for &(x, y, wu) in &circle {
+            let radius = 2.0 + 0.6 * a;
+            points.push(DVec3::new(x * radius, y * radius, 0.6 * b));
+            weights.push(w * wu);
+        }
+    }
+    let torus = Surface::new(k.clone(), k.clone(), points, Some(weights)).unwrap();
+    let line = Knots::bezier(1, 0.0, 1.0).unwrap();
+    let ring = [0.0, 3.0].iter().flat_map(|&z| circle.iter().map(move |&(x, y, _)| DVec3::new(x, y, z))).collect();
+    let cylinder =
+        Surface::new(k.clone(), line, ring, Some(circle.iter().map(|c| c.2).collect::<Vec<_>>().repeat(2))).unwrap();
+    for (name, surface) in [("wavy", wavy), ("torus", torus), ("cylinder", cylinder)] {
+        let found = solve(name, &surface);
+        assert!(found.result.complete, "{name}");
+        assert!(found.result.curves.is_empty() && found.result.miters.is_empty(), "{name}");
+    }
+}
+
+#[test]
+fn a_rational_cross_cap_is_a_cross_cap() {
+    // A projective map takes the double line of the Whitney umbrella to a double line.
+    let whitney = interpolate(&square(), &square(), |u, v| DVec3::new(u, u * v, v * v));
+    let weight = |p: DVec3| 1.0 + 0.2 * p.x - 0.1 * p.y + 0.15 * p.z;
+    let weights: Vec<f64> = whitney.points().iter().map(|&p| weight(p)).collect();
+    let points = whitney.points().iter().map(|&p| p / weight(p)).collect();
+    let [u, v] = whitney.knots().clone();
+    let found = solve("rational", &Surface::new(u, v, points, Some(weights)).unwrap());
+    assert!(found.result.complete);
+    assert_eq!((curves(&found).len(), found.result.miters.len()), (1, 1));
+    for p in &curves(&found)[0].points {
+        assert!(p.uv.x.abs() < 1e-10 && (p.uv.y + p.st.y).abs() < 1e-10);
+    }
+}
+
+#[test]
+fn bad_input_has_a_defined_answer_in_bounded_time() {
+    let k = square();
+    let bad: Vec<(&str, Surface)> = vec![
+        ("point", interpolate(&k, &k, |_, _| DVec3::ONE)),
+        ("line", interpolate(&k, &k, |u, v| DVec3::new(u + v, 2.0 * (u + v), 0.0))),
+        ("flat", interpolate(&k, &k, |u, v| DVec3::new(u, v, 0.0))),
+        ("cusp edge", interpolate(&k, &k, |u, v| turned(DVec3::new(u * u, u * u * u, v)))),
+        ("bent cusp edge", interpolate(&spans(3), &k, |u, v| turned(DVec3::new(u * u, u * u * u + 0.2 * v * v, v)))),
+        ("folded onto itself", interpolate(&k, &k, |u, v| turned(DVec3::new(u * u, v, 0.3 * v * v)))),
+        ("pole", interpolate(&k, &k, |u, v| DVec3::new((v + 1.0) * u, v + 1.0, (v + 1.0) * u * u))),
+    ];
+    for (name, surface) in &bad {
+        let started = Instant::now();
+        let found = solve(name, surface);
+        assert!(started.elapsed().as_secs_f64() < 5.0, "{name}");
+        assert!(found.result.miters.len() <= 2, "{name}: a cusp edge is no thousand miter points");
+    }
+}
