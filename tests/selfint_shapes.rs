@@ -100,7 +100,7 @@ fn solve(name: &str, surface: &Surface) -> SelfIntersection {
         r.unresolved.first(),
         found.evidence
     );
-    for c in &r.curves {
+    for c in r.curves.iter().take(4) {
         println!("   {:?} {:?} {} points, bound {:.1e}", c.kind, c.ends, c.points.len(), c.error_bound);
     }
     for curve in &r.curves {

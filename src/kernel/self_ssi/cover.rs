@@ -80,6 +80,8 @@ pub(crate) struct Search<'a> {
     pace: Pace,
     cap: usize,
     job: &'a Job,
+    /// Mean |Su| and |Sv| of the surface.
+    speed: [f64; 2],
     /// Grid lines.
     lines: [Vec<f64>; 2],
     hulls: HashMap<Key, Rc<Hull>>,
@@ -118,7 +120,12 @@ impl<'a> Search<'a> {
             }
             lines
         });
+        let speed = [0, 1].map(|d| {
+            let at = |k: i32| DVec2::new(f64::from(k % 8) + 0.5, f64::from(k / 8) + 0.5) / 8.0;
+            (0..64).map(|k| sheet.jet(at(k), 1).d[d].length()).sum::<f64>() / 64.0
+        });
         Self {
+            speed,
             sheet,
             miters,
             cusps,
@@ -191,6 +198,7 @@ impl<'a> Search<'a> {
             }
         }
         self.found.hulls = self.hulls.len();
+        self.found.open = merged(std::mem::take(&mut self.found.open));
     }
 
     /// The part of a node inside a clip; `None` when empty.
@@ -221,12 +229,17 @@ impl<'a> Search<'a> {
                 return 0;
             }
         }
-        let hull = self.hull(&part.rect);
-        let mean = |x: &[DVec3]| x.iter().map(|d| d.length()).sum::<f64>() / x.len().max(1) as f64;
-        let size = part.rect.size();
-        // Where the surface is stretched, parameters count as well.
-        let (u, v) = (mean(&hull.du) * size.x + 1e-3 * size.x, mean(&hull.dv) * size.y + 1e-3 * size.y);
+        let [u, v] = self.stretch(&part.rect);
         usize::from(v > u * (1.0 + 1e-9))
+    }
+
+    /// How long a rectangle is in space along u and v. Never much less than what the surface's mean speed makes of
+    /// it: near a singular point lengths in space shrink, and cells must not become needles there.
+    fn stretch(&mut self, rect: &Rect) -> [f64; 2] {
+        let hull = self.hull(rect);
+        let mean = |x: &[DVec3]| x.iter().map(|d| d.length()).sum::<f64>() / x.len().max(1) as f64;
+        let size = rect.size();
+        [mean(&hull.du).max(0.5 * self.speed[0]) * size.x, mean(&hull.dv).max(0.5 * self.speed[1]) * size.y]
     }
 
     /// S1, Sm, S2 and Sc of a part; for boxes the two halves.
@@ -396,13 +409,8 @@ impl<'a> Search<'a> {
             self.found.open.push(([a.rect, b.rect], "the surface may touch itself here"));
             return;
         }
-        let (extent_a, extent_b) = (extent(&ha), extent(&hb));
-        let (large, small) =
-            if extent_a + a.rect.size().max_element() * 1e-3 >= extent_b + b.rect.size().max_element() * 1e-3 {
-                (a, b)
-            } else {
-                (b, a)
-            };
+        let longest = |[u, v]: [f64; 2]| u.max(v);
+        let (large, small) = if longest(self.stretch(&a.rect)) >= longest(self.stretch(&b.rect)) { (a, b) } else { (b, a) };
         let ([first, middle, last], core) = self.children(&large);
         let inner = if large.grid.is_some() { core } else { middle };
         stack.extend([first, inner, last].into_iter().flatten().map(|child| Item::Pair(child, small)));
@@ -604,6 +612,23 @@ impl<'a> Search<'a> {
     }
 }
 
+/// Open pairs that touch in both domains as one, so that one trouble is one entry.
+fn merged(open: Vec<([Rect; 2], &'static str)>) -> Vec<([Rect; 2], &'static str)> {
+    let touch = |a: &Rect, b: &Rect| {
+        let slack = (a.size().max(b.size())) * 0.5;
+        (a.low - slack).cmple(b.high).all() && (b.low - slack).cmple(a.high).all()
+    };
+    let mut out: Vec<([Rect; 2], &'static str)> = Vec::new();
+    for (pair, reason) in open {
+        let found = out.iter_mut().find(|(o, r)| *r == reason && touch(&o[0], &pair[0]) && touch(&o[1], &pair[1]));
+        match found {
+            Some((o, _)) => *o = [o[0].union(&pair[0]), o[1].union(&pair[1])],
+            None => out.push((pair, reason)),
+        }
+    }
+    out
+}
+
 /// The closest point of a (continued) piece, by Gauss-Newton from a start.
 pub(crate) fn foot(sheet: &Sheet, piece: usize, from: DVec2, s: DVec3) -> Option<(DVec2, f64)> {
     let mut q = from;
@@ -672,14 +697,6 @@ fn solve_at(
 /// The direction in which two rectangles of the same parent differ.
 fn differing(a: &Rect, b: &Rect) -> Option<usize> {
     (0..2).find(|&d| a.low[d] != b.low[d] || a.high[d] != b.high[d])
-}
-
-fn extent(hull: &Hull) -> f64 {
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for &p in &hull.pos {
-        (low, high) = (low.min(p), high.max(p));
-    }
-    (high - low).length()
 }
 
 /// Whether a plane separates the hulls: across the axes, both normals, and the line between the middles.

@@ -114,7 +114,9 @@ fn regular(sheet: &Sheet, hull: &Hull) -> bool {
         cross_net(&hull.du, &hull.dv, sheet.degree)
     };
     let mean: DVec3 = normals.iter().sum();
-    mean != DVec3::ZERO && range(mean.normalize_or_zero(), &normals)[0] > 0.0
+    // Not merely above zero: a singular point on the cell's border must not be lost to rounding.
+    let [low, high] = range(mean.normalize_or_zero(), &normals);
+    mean != DVec3::ZERO && low > 1e-11 * high
 }
 
 /// The Bezier net of the cross product of nets of degrees (p - 1, q) and (p, q - 1).
@@ -153,7 +155,7 @@ fn decided(sheet: &Sheet, piece: usize, rect: &Rect, out: &mut Miters, job: &Job
         let grown = rect.grown(0.6);
         cusps.iter().flatten().any(|&c| grown.contains(c))
     };
-    if size < CUSP_CELL && beside(&out.cusps) {
+    if size <= CUSP_CELL && beside(&out.cusps) {
         return true;
     }
     let Some((y, value)) = newton(sheet, rect.center()) else { return false };
@@ -163,8 +165,7 @@ fn decided(sheet: &Sheet, piece: usize, rect: &Rect, out: &mut Miters, job: &Job
     }
     let jet = sheet.jet(m, 2);
     let frame = DMat3::from_cols(value.j[0], value.j[1], value.j[2]);
-    let product = value.j[..3].iter().map(|c| c.length()).product::<f64>();
-    let generic = frame.determinant().abs() > 1e-7 * product;
+    let generic = is_regular(&frame);
     let known = out.points.iter().any(|k| sheet.wrapped(k.at).distance(sheet.wrapped(m)) < 1e-8);
     let here = in_domain(sheet, m);
     if generic {
@@ -232,10 +233,18 @@ fn newton(sheet: &Sheet, from: DVec2) -> Option<([f64; 3], Value)> {
     (value.f.length() <= 1e-11 * scale).then_some((y, value))
 }
 
+/// Whether the miter system's Jacobian is far from singular, both for its columns and in absolute terms (a column that
+/// vanishes but for rounding has a direction, too).
+fn is_regular(frame: &DMat3) -> bool {
+    let lengths = [frame.x_axis.length(), frame.y_axis.length(), frame.z_axis.length()];
+    let largest = lengths[0].max(lengths[1]).max(lengths[2]);
+    let det = frame.determinant().abs();
+    det > 1e-7 * lengths[0] * lengths[1] * lengths[2] && det > 1e-10 * largest * largest * largest
+}
+
 /// Solves a 3 x 3 system; near-singular ones in the sense of damped least squares.
 fn damped(frame: &DMat3, f: DVec3) -> Option<DVec3> {
-    let product = frame.x_axis.length() * frame.y_axis.length() * frame.z_axis.length();
-    if frame.determinant().abs() > 1e-6 * product && product > 0.0 {
+    if is_regular(frame) {
         return Some(frame.inverse() * f);
     }
     let normal = frame.transpose() * *frame;
@@ -289,7 +298,7 @@ fn cusp_edge(sheet: &Sheet, start: [f64; 3], frame: &DMat3, job: &Job) -> Option
             let m = z.truncate();
             let clamped = m.clamp(DVec2::ZERO, DVec2::ONE);
             side.push(clamped);
-            if clamped != m || (side.len() > 8 && clamped.distance(DVec2::new(start[0], start[1])) < 0.5 * STEP) {
+            if clamped.distance(m) > 1e-9 || (side.len() > 8 && clamped.distance(DVec2::new(start[0], start[1])) < 0.5 * STEP) {
                 break;
             }
             let next = kernel(&DMat3::from_cols(value.j[0], value.j[1], value.j[2]));
@@ -340,9 +349,7 @@ mod tests {
         let points = (0..16).map(|at| DVec3::new(squares[at % 4], cubes[at % 4], (at / 4) as f64 / 3.0)).collect();
         let surface = Surface::new(k.clone(), k, points, None).unwrap();
         let sheet = Sheet::new(&surface, 1e-11);
-        let (y, value) = newton(&sheet, DVec2::new(0.52, 0.3)).unwrap();
-        println!("{y:?} {value:?}");
-        let found = find(&sheet, &Job::new());
+                let found = find(&sheet, &Job::new());
         assert_eq!((found.points.len(), found.cusps.len(), found.open.len()), (0, 1, 0), "{} cells", found.cells);
         let edge = &found.cusps[0];
         assert!(edge.iter().all(|p| (p.x - 0.5).abs() < 1e-9));

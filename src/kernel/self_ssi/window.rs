@@ -61,7 +61,7 @@ pub(crate) fn injective(frames: &[[DVec3; 2]]) -> bool {
             }
         }
         let size = p[0].length() + p[1].length();
-        if worst > 1e-12 * size {
+        if worst > 1e-11 * size {
             return true;
         }
         let x = if x == DVec2::ZERO { DVec2::X } else { x.normalize() };

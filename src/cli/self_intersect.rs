@@ -1,0 +1,98 @@
+//! `patchwright self-intersect FILE [--surface N]`: where surfaces meet themselves, with their miter points.
+
+use std::path::PathBuf;
+
+use super::{CliError, Common, Exit, ProgressLine};
+use crate::kernel::job::Job;
+use crate::kernel::self_ssi::{SelfIntersectOptions, self_intersect};
+use crate::kernel::ssi::result::{CurveEnd, Intersection};
+
+/// Arguments of `self-intersect`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The file
+    pub file: PathBuf,
+    /// Only this surface, counted from 0 in the order of the file [default: all of them, each against itself]
+    #[arg(long, value_name = "N")]
+    pub surface: Option<usize>,
+    /// How closely curves follow, in model units [default: 1e-6 of each surface's diagonal]
+    #[arg(long, value_name = "T")]
+    pub tol: Option<f64>,
+}
+
+/// Runs `self-intersect`.
+pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
+    let opened = crate::io::open(&args.file)?;
+    let surfaces: Vec<_> = opened.document.surfaces().map(|(_, surface)| surface.clone()).collect();
+    let numbers = match args.surface {
+        Some(n) if n < surfaces.len() => n..n + 1,
+        Some(n) => {
+            let count = surfaces.len();
+            return Err(CliError::BadArguments(format!("--surface {n}: the file has {count} surfaces, counted from 0")));
+        }
+        None => 0..surfaces.len(),
+    };
+    if let Some(tol) = args.tol.filter(|t| !(t.is_finite() && *t > 0.0)) {
+        return Err(CliError::BadArguments(format!("--tol {tol}: it must be positive and finite")));
+    }
+    let job = Job::new();
+    let progress = ProgressLine::watch(&job);
+    let options = SelfIntersectOptions { tol: args.tol, ..SelfIntersectOptions::default() };
+    let mut all = Intersection { complete: true, ..Intersection::default() };
+    for number in numbers {
+        let one = self_intersect(&surfaces[number], number, &options, &job)?.result;
+        append(&mut all, one);
+    }
+    drop(progress);
+    common.say(format!(
+        "{} self-intersection curves, {} miter points, {} coincident regions, {} unresolved",
+        all.curves.len(),
+        all.miters.len(),
+        all.regions.len(),
+        all.unresolved.len()
+    ));
+    for curve in &all.curves {
+        let name = |end: CurveEnd| format!("{end:?}").to_lowercase();
+        let surface = curve.points.first().map_or(0, |p| p.a);
+        common.say(format!(
+            "  surface {surface}: {} points, {} to {}, within {:.1e}",
+            curve.points.len(),
+            name(curve.ends[0]),
+            name(curve.ends[1]),
+            curve.error_bound
+        ));
+    }
+    common.json(&all)?;
+    Ok(if job.is_cancelled() {
+        Exit::Cancelled
+    } else if all.complete {
+        Exit::Done
+    } else {
+        Exit::Incomplete
+    })
+}
+
+/// Adds the result of one more surface, renumbering what its curves refer to.
+fn append(all: &mut Intersection, mut one: Intersection) {
+    let (miters, regions) = (all.miters.len(), all.regions.len());
+    let junctions = all.junctions.len();
+    for curve in &mut one.curves {
+        for (end, id) in curve.ends.iter().zip(&mut curve.end_ids) {
+            let first = if *end == CurveEnd::Junction { junctions } else { miters };
+            *id = id.map(|id| id + first);
+        }
+        curve.region = curve.region.map(|r| r + regions);
+    }
+    all.complete &= one.complete;
+    all.tol = all.tol.max(one.tol);
+    all.curves.append(&mut one.curves);
+    all.junctions.append(&mut one.junctions);
+    all.miters.append(&mut one.miters);
+    all.regions.append(&mut one.regions);
+    all.unresolved.append(&mut one.unresolved);
+    all.counts.leaf_pairs += one.counts.leaf_pairs;
+    all.counts.nodes_built += one.counts.nodes_built;
+    all.time_ms.build += one.time_ms.build;
+    all.time_ms.traverse += one.time_ms.traverse;
+    all.time_ms.curves += one.time_ms.curves;
+}
