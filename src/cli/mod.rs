@@ -20,6 +20,7 @@ mod output;
 pub mod ranges;
 #[cfg(feature = "editor")]
 pub mod render;
+pub mod self_intersect;
 
 pub use error::CliError;
 pub use exit::Exit;
@@ -58,6 +59,8 @@ pub enum Command {
     /// Make a picture of a model
     #[cfg(feature = "editor")]
     Render(render::Args),
+    /// Find where surfaces meet themselves, with their miter points
+    SelfIntersect(self_intersect::Args),
     /// Lay B-spline patches over the broken parts of a model
     Heal(heal::Args),
     /// Write the bundled example models
@@ -82,6 +85,7 @@ pub fn run(command: &Command, common: &Common) -> Exit {
         Command::Render(args) => render::run(args, common),
         Command::Heal(args) => heal::run(args, common),
         Command::Examples(args) => examples::run(args, common),
+        Command::SelfIntersect(args) => self_intersect::run(args, common),
     };
     let exit = result.unwrap_or_else(|error| {
         common.warn(format!("error: {}", error.message()));

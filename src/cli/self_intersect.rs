@@ -28,7 +28,9 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         Some(n) if n < surfaces.len() => n..n + 1,
         Some(n) => {
             let count = surfaces.len();
-            return Err(CliError::BadArguments(format!("--surface {n}: the file has {count} surfaces, counted from 0")));
+            return Err(CliError::BadArguments(format!(
+                "--surface {n}: the file has {count} surfaces, counted from 0"
+            )));
         }
         None => 0..surfaces.len(),
     };

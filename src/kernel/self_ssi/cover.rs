@@ -27,6 +27,8 @@ use crate::kernel::job::Job;
 const GROWTH: f64 = 3.25;
 /// The smallest box.
 const SMALLEST: f64 = 1e-7;
+/// With more unresolved boxes than this the search gives up.
+const MANY_OPEN: usize = 1000;
 /// Coincidence is looked for in boxes between these sizes: in smaller ones being close proves nothing.
 const COINCIDENCE_CELL: f64 = 1.0 / 24.0;
 const FINEST_COINCIDENCE: f64 = 1.0 / 1024.0;
@@ -180,9 +182,16 @@ impl<'a> Search<'a> {
         let mut steps = 0;
         while let Some(item) = stack.pop() {
             steps += 1;
-            if steps > self.cap || self.job.is_cancelled() {
+            let crowded = self.found.open.len() > MANY_OPEN;
+            if steps > self.cap || crowded || self.job.is_cancelled() {
                 self.found.capped = true;
-                let reason = if self.job.is_cancelled() { "cancelled" } else { "the cap on cell pairs was reached" };
+                let reason = if self.job.is_cancelled() {
+                    "cancelled"
+                } else if crowded {
+                    "too much is unresolved already"
+                } else {
+                    "the cap on cell pairs was reached"
+                };
                 for item in stack.drain(..).chain([item]).take(64) {
                     let pair = match item {
                         Item::Alone(a) => [a.rect; 2],
@@ -410,7 +419,8 @@ impl<'a> Search<'a> {
             return;
         }
         let longest = |[u, v]: [f64; 2]| u.max(v);
-        let (large, small) = if longest(self.stretch(&a.rect)) >= longest(self.stretch(&b.rect)) { (a, b) } else { (b, a) };
+        let (large, small) =
+            if longest(self.stretch(&a.rect)) >= longest(self.stretch(&b.rect)) { (a, b) } else { (b, a) };
         let ([first, middle, last], core) = self.children(&large);
         let inner = if large.grid.is_some() { core } else { middle };
         stack.extend([first, inner, last].into_iter().flatten().map(|child| Item::Pair(child, small)));
@@ -613,7 +623,7 @@ impl<'a> Search<'a> {
 }
 
 /// Open pairs that touch in both domains as one, so that one trouble is one entry.
-fn merged(open: Vec<([Rect; 2], &'static str)>) -> Vec<([Rect; 2], &'static str)> {
+pub(crate) fn merged(open: Vec<([Rect; 2], &'static str)>) -> Vec<([Rect; 2], &'static str)> {
     let touch = |a: &Rect, b: &Rect| {
         let slack = (a.size().max(b.size())) * 0.5;
         (a.low - slack).cmple(b.high).all() && (b.low - slack).cmple(a.high).all()

@@ -65,6 +65,8 @@ pub(crate) struct Miters {
 const SMALLEST: f64 = 1e-7;
 /// The most cells.
 const CAP: usize = 40_000;
+/// With more undecided cells than this the search gives up.
+const MANY_OPEN: usize = 1000;
 /// Cells smaller than this are skipped beside a cusp edge.
 const CUSP_CELL: f64 = 1.0 / 64.0;
 
@@ -77,7 +79,7 @@ pub(crate) fn find(sheet: &Sheet, job: &Job) -> Miters {
         let mut next = Vec::new();
         for (piece, rect) in level {
             out.cells += 1;
-            if job.is_cancelled() || out.cells > CAP {
+            if job.is_cancelled() || out.cells > CAP || out.open.len() > MANY_OPEN {
                 out.open.push(rect);
                 continue;
             }
@@ -298,7 +300,9 @@ fn cusp_edge(sheet: &Sheet, start: [f64; 3], frame: &DMat3, job: &Job) -> Option
             let m = z.truncate();
             let clamped = m.clamp(DVec2::ZERO, DVec2::ONE);
             side.push(clamped);
-            if clamped.distance(m) > 1e-9 || (side.len() > 8 && clamped.distance(DVec2::new(start[0], start[1])) < 0.5 * STEP) {
+            if clamped.distance(m) > 1e-9
+                || (side.len() > 8 && clamped.distance(DVec2::new(start[0], start[1])) < 0.5 * STEP)
+            {
                 break;
             }
             let next = kernel(&DMat3::from_cols(value.j[0], value.j[1], value.j[2]));
@@ -349,7 +353,7 @@ mod tests {
         let points = (0..16).map(|at| DVec3::new(squares[at % 4], cubes[at % 4], (at / 4) as f64 / 3.0)).collect();
         let surface = Surface::new(k.clone(), k, points, None).unwrap();
         let sheet = Sheet::new(&surface, 1e-11);
-                let found = find(&sheet, &Job::new());
+        let found = find(&sheet, &Job::new());
         assert_eq!((found.points.len(), found.cusps.len(), found.open.len()), (0, 1, 0), "{} cells", found.cells);
         let edge = &found.cusps[0];
         assert!(edge.iter().all(|p| (p.x - 0.5).abs() < 1e-9));

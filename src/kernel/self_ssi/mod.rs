@@ -208,12 +208,14 @@ pub fn self_intersect(
             isolated: miter.kind == MiterKind::Isolated,
         });
     }
-    for rect in &miters.open {
-        result.unresolved.push(open([*rect; 2], "a miter point could not be separated from its surroundings"));
+    let reason = "a miter point could not be separated from its surroundings";
+    for (pair, reason) in cover::merged(miters.open.iter().map(|&r| ([r; 2], reason)).collect()) {
+        result.unresolved.push(open(pair, reason));
     }
     result.unresolved.extend(found.open.iter().map(|(pair, reason)| open(*pair, reason)));
-    for c in &found.coincident {
-        result.unresolved.push(open([c.a, c.b], "the surface coincides with itself here"));
+    let reason = "the surface coincides with itself over an area here";
+    for (pair, reason) in cover::merged(found.coincident.iter().map(|c| ([c.a, c.b], reason)).collect()) {
+        result.unresolved.push(open(pair, reason));
     }
     result.complete = result.unresolved.is_empty() && !found.capped && !job.is_cancelled();
     result.counts = Counts { leaf_pairs: found.leaf_pairs, nodes_built: found.hulls + miters.cells };
