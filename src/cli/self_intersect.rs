@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use super::{CliError, Common, Exit, ProgressLine};
-use crate::kernel::job::Job;
 use crate::kernel::self_ssi::{SelfIntersectOptions, self_intersect};
 use crate::kernel::ssi::result::{CurveEnd, Intersection};
 
@@ -37,7 +36,7 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
     if let Some(tol) = args.tol.filter(|t| !(t.is_finite() && *t > 0.0)) {
         return Err(CliError::BadArguments(format!("--tol {tol}: it must be positive and finite")));
     }
-    let job = Job::new();
+    let job = super::job();
     let progress = ProgressLine::watch(&job);
     let options = SelfIntersectOptions { tol: args.tol, ..SelfIntersectOptions::default() };
     let mut all = Intersection { complete: true, ..Intersection::default() };
@@ -46,6 +45,9 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         append(&mut all, one);
     }
     drop(progress);
+    for warning in job.warnings() {
+        common.warn(warning);
+    }
     common.say(format!(
         "{} self-intersection curves, {} miter points, {} coincident regions, {} unresolved",
         all.curves.len(),

@@ -318,7 +318,7 @@ impl<'a> Search<'a> {
             Some(&known) => known,
             None => {
                 self.found.windows += 1;
-                let proved = injective(&self.sheet.frames(rect));
+                let proved = injective(&self.sheet.window_frames(rect));
                 self.injective.insert(k, proved);
                 if !proved {
                     self.found.failed_windows += 1;
@@ -387,7 +387,7 @@ impl<'a> Search<'a> {
                 windowed = true;
             }
         }
-        if windowed || (!touching && apart(&ha, &hb)) {
+        if windowed || (!touching && apart(&ha, &hb)) || self.apart_at_pole(&a.rect, &b.rect) {
             return;
         }
         let size = a.rect.size().max_element().max(b.rect.size().max_element());
@@ -424,6 +424,16 @@ impl<'a> Search<'a> {
         let ([first, middle, last], core) = self.children(&large);
         let inner = if large.grid.is_some() { core } else { middle };
         stack.extend([first, inner, last].into_iter().flatten().map(|child| Item::Pair(child, small)));
+    }
+
+    /// Whether two cells at the same pole meet in it only: their cones seen from the pole lie on two sides of a plane.
+    fn apart_at_pole(&self, a: &Rect, b: &Rect) -> bool {
+        let Some(pole) = self.sheet.pole_at(a).filter(|p| self.sheet.pole_at(b) == Some(*p)) else { return false };
+        let (ta, tb) = (self.sheet.polar(a, pole).t, self.sheet.polar(b, pole).t);
+        let mean = |x: &[DVec3]| (x.iter().sum::<DVec3>()).normalize_or_zero();
+        let y = mean(&ta) - mean(&tb);
+        let (ra, rb) = (range(y, &ta), range(y, &tb));
+        ra[0] > 1e-12 * ra[1] && rb[1] < 1e-12 * rb[0]
     }
 
     /// The pair test. See the module's text.

@@ -61,6 +61,14 @@ pub(crate) struct Hull {
     pub dv: Vec<DVec3>,
 }
 
+/// Bounds beside a pole. See [`Sheet::polar`].
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Polar {
+    pub t: Vec<DVec3>,
+    pub along: Vec<DVec3>,
+    pub away: Vec<DVec3>,
+}
+
 /// Bounds of Su, Sv, Suu, Suv, Svv together.
 #[derive(Clone, Debug)]
 pub(crate) enum Jets {
@@ -171,19 +179,89 @@ impl Sheet {
 
     /// Bounds over a rectangle on one piece, continued where the rectangle leaves it.
     pub fn hull_on(&self, piece: usize, rect: &Rect) -> Hull {
-        let net = self.net(piece, rect);
-        let size = rect.size();
+        self.hull_of(&self.net(piece, rect), rect.size())
+    }
+
+    fn hull_of(&self, net: &[DVec4], size: DVec2) -> Hull {
         if !self.rational {
             let pos: Vec<DVec3> = net.iter().map(|h| h.truncate()).collect();
             let (du, dv) = (self.differences(&pos, 0, size.x), self.differences(&pos, 1, size.y));
             return Hull { pos, du, dv };
         }
-        let Some(q) = Quotient::new(self, &net, size) else { return Hull::everything() };
+        let Some(q) = Quotient::new(self, net, size) else { return Hull::everything() };
         Hull {
             pos: net.iter().map(|h| h.truncate() / h.w).collect(),
             du: q.first(0).corners(),
             dv: q.first(1).corners(),
         }
+    }
+
+    /// Bounds over a rectangle that touches the pole at `end` of direction `d`, with the distance t from that side
+    /// divided out: of T = (S - pole) / t, of its derivative along the pole (which is S's, divided by t), and of S's
+    /// derivative away from the pole.
+    pub fn polar(&self, rect: &Rect, (d, end): (usize, usize)) -> Polar {
+        let mut out = Polar::default();
+        for (piece, part) in self.parts(rect) {
+            let net = self.net(piece, &part);
+            let size = part.size();
+            let hull = self.hull_of(&net, size);
+            let (along, away) = if d == 1 { (&hull.du, &hull.dv) } else { (&hull.dv, &hull.du) };
+            out.away.extend(away);
+            let (near, far) =
+                if end == 0 { (part.low[d], part.high[d]) } else { (1.0 - part.high[d], 1.0 - part.low[d]) };
+            if near > 0.0 {
+                let pole = self.point(if end == 0 { DVec2::ZERO } else { DVec2::ONE });
+                for t in [near, far] {
+                    out.t.extend(hull.pos.iter().map(|&p| (p - pole) / t));
+                    out.along.extend(along.iter().map(|&x| x / t));
+                }
+                continue;
+            }
+            let t = self.hull_of(&self.divided(&net, d, end, far), size);
+            out.along.extend(if d == 1 { &t.du } else { &t.dv });
+            out.t.extend(t.pos);
+        }
+        out
+    }
+
+    /// The net of (S - pole) / t, t the distance from the side at `end` of direction `d`, `length` across the net.
+    fn divided(&self, net: &[DVec4], d: usize, end: usize, length: f64) -> Vec<DVec4> {
+        let (width, height) = (self.degree[0] + 1, self.degree[1] + 1);
+        let (lines, count, line_step, step) =
+            if d == 0 { (height, width, width, 1) } else { (width, height, 1, width) };
+        let n = count - 1;
+        let at = |line: usize, k: usize| line * line_step + (if end == 0 { k } else { n - k }) * step;
+        let mut out = net.to_vec();
+        for line in 0..lines {
+            let first = net[at(line, 0)];
+            let pole = first.truncate() / first.w;
+            // Degree n - 1: control point k of S - pole, times n / k, is control point k - 1 of the quotient.
+            let low: Vec<DVec3> = (1..count)
+                .map(|k| {
+                    let h = net[at(line, k)];
+                    (h.truncate() - pole * h.w) * (n as f64 / (k as f64 * length))
+                })
+                .collect();
+            for k in 0..count {
+                let f = k as f64 / n as f64;
+                let before = if k > 0 { low[k - 1] * f } else { DVec3::ZERO };
+                let here = if k < n { low[k] * (1.0 - f) } else { DVec3::ZERO };
+                out[at(line, k)] = (before + here).extend(net[at(line, k)].w);
+            }
+        }
+        out
+    }
+
+    /// What the window test needs over a rectangle: [`Self::frames`], with poles divided out.
+    pub fn window_frames(&self, rect: &Rect) -> Vec<[DVec3; 2]> {
+        let Some(pole) = self.pole_at(rect) else { return self.frames(rect) };
+        let polar = self.polar(rect, pole);
+        let pair = |a: DVec3, b: DVec3| if pole.0 == 1 { [a, b] } else { [b, a] };
+        let (mut along, mut away) = (polar.along, polar.away);
+        if along.len() * away.len() > 400 {
+            (along, away) = (corners(&along), corners(&away));
+        }
+        along.iter().flat_map(|&a| away.iter().map(move |&b| pair(a, b))).collect()
     }
 
     /// Pairs (Su, Sv) in whose convex hull the pair of derivatives lies at every point of a rectangle.

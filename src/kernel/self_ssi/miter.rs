@@ -83,8 +83,12 @@ pub(crate) fn find(sheet: &Sheet, job: &Job) -> Miters {
                 out.open.push(rect);
                 continue;
             }
-            let hull = sheet.hull_on(piece, &rect);
-            if regular(sheet, &hull) {
+            let excluded = match sheet.pole_at(&rect) {
+                // Su x Sv vanishes in the pole itself: divide by the distance from it.
+                Some(_) => one_sided(sheet.window_frames(&rect).iter().map(|[u, v]| u.cross(*v)).collect()),
+                None => regular(sheet, &sheet.hull_on(piece, &rect)),
+            };
+            if excluded {
                 continue;
             }
             if decided(sheet, piece, &rect, &mut out, job) {
@@ -115,6 +119,11 @@ fn regular(sheet: &Sheet, hull: &Hull) -> bool {
     } else {
         cross_net(&hull.du, &hull.dv, sheet.degree)
     };
+    one_sided(normals)
+}
+
+/// Whether vectors lie strictly on one side of a plane through the origin.
+fn one_sided(normals: Vec<DVec3>) -> bool {
     let mean: DVec3 = normals.iter().sum();
     // Not merely above zero: a singular point on the cell's border must not be lost to rounding.
     let [low, high] = range(mean.normalize_or_zero(), &normals);

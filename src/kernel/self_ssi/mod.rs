@@ -62,7 +62,7 @@ pub struct SelfIntersectOptions {
 
 impl Default for SelfIntersectOptions {
     fn default() -> Self {
-        Self { tol: None, miter_radius: None, grid: 128, pair_cap: 400_000, point_cap: 200_000 }
+        Self { tol: None, miter_radius: None, grid: 128, pair_cap: 150_000, point_cap: 200_000 }
     }
 }
 

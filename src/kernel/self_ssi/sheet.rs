@@ -6,6 +6,7 @@
 
 use glam::{DVec2, DVec3, DVec4};
 
+use super::hull::Rect;
 use crate::kernel::geom::{MAX_DEGREE, Surface};
 
 /// The highest sum of degrees for which pieces are also kept in powers (conditioning gets poor beyond).
@@ -57,6 +58,8 @@ pub(crate) struct Sheet {
     pub pieces: Vec<Piece>,
     /// Which directions close on themselves.
     pub periodic: [bool; 2],
+    /// Which sides are one point: `poles[d][e]` is the side at e of direction d.
+    pub poles: [[bool; 2]; 2],
     /// Space: model = origin + scale * here.
     pub origin: DVec3,
     pub scale: f64,
@@ -108,10 +111,41 @@ impl Sheet {
         }
         let rational = surface.weights().is_some();
         let rounding = 8.0 * f64::EPSILON * (1.0 + bounds.max_abs() / scale);
-        let mut sheet =
-            Self { breaks, degree, rational, pieces, periodic: [false; 2], origin, scale, domain, rounding };
+        let mut sheet = Self {
+            breaks,
+            degree,
+            rational,
+            pieces,
+            periodic: [false; 2],
+            poles: [[false; 2]; 2],
+            origin,
+            scale,
+            domain,
+            rounding,
+        };
         sheet.periodic = [0, 1].map(|d| sheet.closes(d, (gap / scale).max(1e-12).max(4.0 * rounding)));
+        let noise = (gap / scale).max(1e-12).max(4.0 * rounding);
+        sheet.poles = [0, 1].map(|d| [0.0, 1.0].map(|end| sheet.is_pole(d, end, noise)));
         sheet
+    }
+
+    /// Whether a side is one point.
+    fn is_pole(&self, d: usize, end: f64, gap: f64) -> bool {
+        let at = |t: f64| if d == 0 { DVec2::new(end, t) } else { DVec2::new(t, end) };
+        let first = self.point(at(0.0));
+        self.breaks[1 - d]
+            .windows(2)
+            .all(|b| (1..=8).all(|k| self.point(at(b[0] + (b[1] - b[0]) * f64::from(k) / 8.0)).distance(first) <= gap))
+    }
+
+    /// The pole that a rectangle touches: direction and end. None where it touches more than one.
+    pub fn pole_at(&self, rect: &Rect) -> Option<(usize, usize)> {
+        let mut touched = (0..2)
+            .flat_map(|d| [(d, 0, rect.low[d] <= 0.0), (d, 1, rect.high[d] >= 1.0)].into_iter())
+            .filter(|&(d, end, touches)| touches && self.poles[d][end])
+            .map(|(d, end, _)| (d, end));
+        let first = touched.next();
+        if touched.next().is_some() { None } else { first }
     }
 
     /// Whether the two sides across direction `d` are the same curve, and not both one point.

@@ -7,6 +7,10 @@
 //! dS; P is sought by perceptron steps on the worst hull point. (With p . Sv = q . Su = 0 in the middle this is
 //! min(p.Su) min(q.Sv) > max|p.Sv + q.Su|^2 / 4, only sharper.)
 //!
+//! *Beside a pole*, where Su = t X with t the distance from the collapsed side, take P x = (mean of t) du p + dv q: the
+//! product with the mean derivative is the same form in ((mean of t) du, dv), with X weighted by t in place of Su, so
+//! that the test on all pairs of hull points of X and Sv proves that two points coincide in the pole only.
+//!
 //! *Cross-cap.* Near a generic miter point m with null direction e, points that coincide are m' +- r (k, 1) in the
 //! frame (e', e), e' perpendicular to e, with zeros of the mean of k S_x + S_y along the segment. Where the Jacobian of
 //! that mean by (m', k), preconditioned by its value at m, is regular over the window, every r has at most one
