@@ -7,7 +7,6 @@ use serde::Serialize;
 
 use super::{CliError, Common, Exit, ProgressLine};
 use crate::io::{self, SaveOptions};
-use crate::kernel::job::Job;
 use crate::model::document::{Document, Shape};
 use crate::model::healing::{self, Healing};
 use crate::model::spec::{HealSpec, HealStep};
@@ -81,7 +80,7 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         spec.tol = Some(tol);
     }
     let document = io::open(&args.file)?.document;
-    let job = Job::new();
+    let job = super::job();
     let start = Instant::now();
     let result = {
         let _progress = ProgressLine::watch(&job);
