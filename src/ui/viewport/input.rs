@@ -116,16 +116,21 @@ impl Viewport {
         self.hovered = out.hover.as_ref().and_then(|hit| hit_entity(hit)).or(self.from_list.take());
         if out.click.is_some() {
             let options = self.options(filter, points);
-            let hits = pick_all(&self.scene, &self.view(), pixel, &options);
+            let mut hits = pick_all(&self.scene, &self.view(), pixel, &options);
             if modifiers.alt {
                 out.click = None;
                 out.list = Some(hits);
             } else {
-                // What lies hidden is reached by clicking again, never by the first click.
-                let first_hidden = hits.first().is_some_and(|hit| hit.hidden);
-                let chosen = self.cycle.click(pixel, &hits).copied();
-                let chosen = if first_hidden && out.hover.is_none() && filter == Filter::ALL { None } else { chosen };
-                out.click = Some((chosen, modifiers));
+                // The first click takes what was highlighted, never something else that is as near, and nothing that
+                // is hidden; clicking again goes on from there.
+                match &out.hover {
+                    Some(hover) => {
+                        hits.retain(|hit| !hit.target.same_thing(&hover.target));
+                        hits.insert(0, *hover);
+                    }
+                    None => hits.clear(),
+                }
+                out.click = Some((self.cycle.click(pixel, &hits).copied(), modifiers));
             }
         }
         out
