@@ -3,6 +3,7 @@
 
 pub mod camera;
 pub mod colormap;
+pub mod deviation;
 pub mod display;
 pub mod histogram;
 pub mod legend;

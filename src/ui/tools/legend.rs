@@ -6,9 +6,11 @@ use super::super::editor::Editor;
 use super::super::status::{length, short};
 use super::super::theme;
 use super::Tool;
-use super::patch::PatchSession;
+use super::patch::{PatchSession, fitting};
 use crate::model::document::Unit;
-use crate::render::{ColorScale, to_srgb8};
+use crate::render::to_srgb8;
+use crate::view::histogram::Histogram;
+use crate::view::legend::LegendRange;
 use crate::view::patch_tool::Stage;
 
 /// Bins of the histogram.
@@ -82,10 +84,11 @@ impl Editor {
         }
         painter.text(pos2(gap.right() + 7.0, gap.center().y), Align2::LEFT_CENTER, "no data", small, t.text[1]);
         let area = ui.interact(panel, ui.scope_id().with("legend"), Sense::click_and_drag());
-        area.widget_info(|| egui::WidgetInfo::slider(true, session.range, "Deviation range"));
+        area.widget_info(|| egui::WidgetInfo::slider(true, session.range.high, "Deviation range"));
         if area.dragged() {
-            session.range *= f64::from(area.drag_delta().y / 120.0).exp();
-            session.range_locked = true;
+            let to = session.range.high * f64::from(area.drag_delta().y / 120.0).exp();
+            session.range =
+                LegendRange { locked: true, ..session.range.dragged(false, to, session.tool.options().tol) };
             session.revision += 1;
         }
         if area.double_clicked() {
@@ -109,8 +112,7 @@ impl PatchSession {
     /// The range that fits what was measured.
     pub fn reset_range(&mut self) {
         if let Some(shown) = &self.shown {
-            self.range = shown.deviation.max.max(3.0 * self.tool.options().tol);
-            self.range_locked = false;
+            self.range = fitting(shown, self.tool.options().tol);
             self.revision += 1;
         }
     }
@@ -120,14 +122,15 @@ impl PatchSession {
         let Some(shown) = &self.shown else { return };
         let t = theme::of(ui);
         let scale = self.scale();
-        let (counts, out) = bins(&shown.deviation.values, &scale);
-        let most = counts.iter().copied().max().unwrap_or(0).max(1);
+        let values = shown.deviation.values.iter().map(|&v| Some(f64::from(v)));
+        let histogram = Histogram::new(values, [self.range.low, self.range.high], BINS);
+        let most = histogram.highest().max(1);
         let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 74.0), Sense::hover());
         let painter = ui.painter();
         painter.rect_filled(rect, 4.0, t.field);
         let inner = rect.shrink2(vec2(8.0, 6.0));
         let width = inner.width() / BINS as f32;
-        for (k, &count) in counts.iter().enumerate() {
+        for (k, &count) in histogram.counts.iter().enumerate() {
             // A root keeps single outliers visible beside the bulk.
             let h = (count as f32 / most as f32).sqrt() * (inner.height() - 14.0);
             let x = inner.left() + k as f32 * width;
@@ -147,44 +150,15 @@ impl PatchSession {
         for (x, align, v) in ends {
             painter.text(pos2(x, y + 1.0), align, short(f64::from(v)), font.clone(), t.text[1]);
         }
-        let [below, above, none] = out;
         response.on_hover_text(format!(
-            "{} vertices: {below} below and {above} above the range, {none} without data (over gaps). Root-scaled. Largest {}",
+            "{} vertices: {} below and {} above the range, {} without data (over gaps). Heights are square roots. Within \
+             tolerance: {:.0} %. Largest {}",
             shown.deviation.values.len(),
+            histogram.below,
+            histogram.above,
+            histogram.missing,
+            100.0 * histogram.share_within(self.tool.options().tol),
             length(shown.deviation.max, unit)
         ));
-    }
-}
-
-/// Counts per bin, and what is below, above and without data.
-fn bins(values: &[f32], scale: &ColorScale) -> ([usize; BINS], [usize; 3]) {
-    let (mut counts, mut out) = ([0; BINS], [0; 3]);
-    for &v in values {
-        if v.is_nan() {
-            out[2] += 1;
-        } else if v < scale.low {
-            out[0] += 1;
-        } else if v > scale.high {
-            out[1] += 1;
-        } else {
-            let at = ((v - scale.low) / (scale.high - scale.low) * BINS as f32) as usize;
-            counts[at.min(BINS - 1)] += 1;
-        }
-    }
-    (counts, out)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_value_is_counted_once() {
-        let scale = ColorScale::deviation(1.0, 0.1);
-        let values = [-2.0, -1.0, -0.5, 0.0, 0.0, 1.0, 1.5, f32::NAN];
-        let (counts, out) = bins(&values, &scale);
-        assert_eq!(out, [1, 1, 1]);
-        assert_eq!(counts.iter().sum::<usize>() + out.iter().sum::<usize>(), values.len());
-        assert_eq!((counts[0], counts[BINS / 2], counts[BINS - 1]), (1, 2, 1));
     }
 }

@@ -9,21 +9,22 @@ use super::super::editor::{Editor, Page};
 use super::super::viewport::Pointer;
 use super::Tool;
 use crate::kernel::geom::Surface;
-use crate::kernel::heal::deviation::Check;
 use crate::kernel::heal::preview::{Preview, PreviewOptions, preview};
 use crate::kernel::heal::project::Status;
 use crate::kernel::job::Job;
 use crate::kernel::mesh::surface_set::SurfaceSet;
 use crate::kernel::mesh::tessellate::{SurfaceMesh, tessellate_on};
 use crate::model::command::Command;
-use crate::model::document::{Document, Patch};
+use crate::model::document::{Document, EntityId, Patch};
 use crate::model::healing;
 use crate::model::resolve::resolve;
 use crate::model::spec::HealSpec;
 use crate::view::deviation::{Deviation, deviation};
+use crate::view::legend::LegendRange;
 use crate::view::patch_tool::{Effect, Event, Key, PatchTool, Stage};
 use crate::view::pick::PickHit;
 use crate::view::snap::{Snap, SnapOptions};
+use crate::view::worst::{Worst, worst};
 use crate::work::{Lane, Latest, Outcome, Ticket};
 
 /// Lines of the deviation map for each span of the patch, and at least and at most.
@@ -43,7 +44,7 @@ pub struct Shown {
     /// The deviation at each of its vertices.
     pub deviation: Deviation,
     /// The worst check points, largest first.
-    pub worst: Vec<Check>,
+    pub worst: Vec<Worst>,
     /// The samples: where they are and what they are.
     pub samples: Vec<(DVec3, Status)>,
     /// False when the job was cancelled and this is what was ready.
@@ -64,9 +65,7 @@ pub struct PatchSession {
     /// The patch to be judged.
     pub shown: Option<Shown>,
     /// The ends of the deviation scale.
-    pub range: f64,
-    /// Whether the range stays for the next patch.
-    pub range_locked: bool,
+    pub range: LegendRange,
     /// Shows the box of influence.
     pub show_slab: bool,
     /// Which snaps are on.
@@ -89,8 +88,7 @@ impl PatchSession {
             sketch: Latest::default(),
             healing: None,
             shown: None,
-            range: 0.0,
-            range_locked: false,
+            range: LegendRange { low: -1.0, high: 1.0, locked: false },
             show_slab: false,
             snaps: [true; 5],
             revision: 1,
@@ -201,9 +199,7 @@ impl Editor {
         session.revision += 1;
         let event = match outcome {
             Outcome::Finished { value: Ok(shown), .. } => {
-                if !session.range_locked || session.range <= 0.0 {
-                    session.range = default_range(&shown, session.tool.options().tol);
-                }
+                session.range = session.range.updated(fitting(&shown, session.tool.options().tol));
                 let patch = Arc::clone(&shown.patch);
                 session.shown = Some(shown);
                 Event::Finished(Ok(patch))
@@ -371,13 +367,14 @@ fn heal(document: &Document, spec: &HealSpec, kept: &Originals, job: &Job) -> Re
         patch: Arc::new(patch.clone()),
         mesh,
         deviation,
-        worst: healed.deviation.worst(3),
+        // One patch only, so its id is of no account.
+        worst: worst([(EntityId(0), &healed.deviation)], 3, 0.05 * surface.bounds().diagonal()),
         samples: healed.samples.values().iter().map(|s| (s.point, s.status)).collect(),
         complete,
     })
 }
 
-/// The ends of the scale: what was measured, and never less than three tolerances.
-fn default_range(shown: &Shown, tol: f64) -> f64 {
-    shown.deviation.max.max(3.0 * tol)
+/// The range that holds what was measured.
+pub fn fitting(shown: &Shown, tol: f64) -> LegendRange {
+    LegendRange::symmetric(shown.deviation.values.iter().map(|&v| f64::from(v)), tol)
 }

@@ -279,7 +279,7 @@ impl PatchSession {
 
     /// The colours of the deviation map.
     pub fn scale(&self) -> ColorScale {
-        ColorScale::deviation(self.range as f32, self.tool.options().tol as f32)
+        ColorScale::deviation(self.range.high as f32, self.tool.options().tol as f32)
     }
 }
 

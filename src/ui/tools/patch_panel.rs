@@ -451,7 +451,7 @@ fn result(ui: &mut Ui, session: &mut PatchSession, unit: crate::model::document:
         if ui.checkbox(&mut on, "Map").on_hover_text("D").changed() {
             event = Some(Event::Key(Key::Deviation));
         }
-        if ui.checkbox(&mut session.range_locked, "Lock range").on_hover_text("Keep it for the next patch").changed() {
+        if ui.checkbox(&mut session.range.locked, "Lock range").on_hover_text("Keep it for the next patch").changed() {
             session.revision += 1;
         }
         reset = ui.button("Fit range").clicked();
@@ -462,7 +462,7 @@ fn result(ui: &mut Ui, session: &mut PatchSession, unit: crate::model::document:
         ui.add_space(4.0);
         panels::heading(ui, "Worst points");
         for (k, check) in worst.iter().enumerate() {
-            let text = format!("{}   {}", k + 1, length(check.distance.unwrap_or(0.0)));
+            let text = format!("{}   {}", k + 1, length(check.distance));
             let button = egui::Button::new(text).min_size(vec2(ui.available_width(), 24.0)).right_text("Zoom to");
             if ui.add(button).accessible_name(format!("Worst point {}", k + 1)).clicked() {
                 asks.push(Ask::Zoom(check.point));
