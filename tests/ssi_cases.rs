@@ -44,7 +44,7 @@ fn all() {
     for name in names {
         let Some(case) = Case::load(&name) else { continue };
         let problem = case.document["problem"].as_str().unwrap_or("");
-        if problem == "ssi" && name.contains(&only) {
+        if ["ssi", "overlap"].contains(&problem) && name.contains(&only) {
             bad += usize::from(!check(&name).is_empty());
         }
     }
@@ -57,6 +57,7 @@ fn show() {
     let Some(case) = Case::load(&std::env::var("CASE").unwrap_or_default()) else { return };
     let [a, b] = case.sides();
     let result = intersect(&a, &b, &SsiOptions::default(), &Job::new()).unwrap();
+    println!("{:?} complete {}, {} regions {:?}", result.counts, result.complete, result.regions.len(), result.regions.iter().map(|r| (r.max_distance, r.boundary.iter().map(Vec::len).collect::<Vec<_>>())).collect::<Vec<_>>());
     for j in &result.junctions {
         println!("junction {j:?}");
     }

@@ -82,7 +82,7 @@ pub fn faults(result: &Intersection, oracle: &Value) -> Vec<String> {
         }
     }
     for (j, taken) in taken.iter().enumerate() {
-        if taken.is_none() {
+        if taken.is_none() && result.curves[j].region.is_none() {
             out.push(format!(
                 "curve {j} is in excess ({} points, length {:.3e}, {:?}, ends {:?})",
                 ours[j].len(),
@@ -90,6 +90,26 @@ pub fn faults(result: &Intersection, oracle: &Value) -> Vec<String> {
                 result.curves[j].kind,
                 result.curves[j].ends
             ));
+        }
+    }
+    if let Some(boundary) = oracle["overlap_boundary"].as_array() {
+        let boundary = points(&Value::Array(boundary.clone()));
+        let lines: Vec<Vec<DVec3>> = result
+            .regions
+            .iter()
+            .flat_map(|r| r.boundary.iter().map(|l| l.iter().map(|p| p.xyz).collect()))
+            .collect();
+        if lines.len() != 1 {
+            out.push(format!("{} region boundaries, expected 1", lines.len()));
+        } else {
+            let missed = boundary.iter().map(|&p| distance(p, &lines[0])).fold(0.0, f64::max);
+            let extra = lines[0].iter().map(|&p| excess(p, &boundary)).fold(0.0, f64::max);
+            if missed > 1e-5 || extra > 1e-5 {
+                out.push(format!("the region's boundary is off by {missed:.1e} and {extra:.1e}"));
+            }
+        }
+        if result.regions.iter().any(|r| r.max_distance > 1e-9) {
+            out.push("the region's distance bound is poor".into());
         }
     }
     // Junctions and their degrees.
@@ -138,7 +158,7 @@ pub fn faults(result: &Intersection, oracle: &Value) -> Vec<String> {
         }
     }
     let count = |name: &str| oracle[name].as_u64().map(|n| n as usize);
-    let loops = result.curves.iter().filter(|c| c.closed).count();
+    let loops = result.curves.iter().filter(|c| c.closed && c.region.is_none()).count();
     if count("n_loops").is_some_and(|n| n != loops) {
         out.push(format!("{loops} loops, expected {}", oracle["n_loops"]));
     }

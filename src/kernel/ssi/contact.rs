@@ -74,6 +74,8 @@ pub struct Cell {
     pub high: DVec2,
     /// Its middle on A and the foot of that on B.
     pub middle: PointPair,
+    /// A bound of the gap over it.
+    pub gap: f64,
 }
 
 /// A place from which a curve can be traced.
@@ -307,7 +309,14 @@ impl Contact {
     fn cell(&self, sub: &Sub) -> Cell {
         let size = self.high - self.low;
         let low = self.low + size * sub.low;
-        Cell { pa: self.pa, pb: self.pb, low, high: low + size * sub.size, middle: self.pair(sub.low + 0.5 * sub.size) }
+        Cell {
+            pa: self.pa,
+            pb: self.pb,
+            low,
+            high: low + size * sub.size,
+            middle: self.pair(sub.low + 0.5 * sub.size),
+            gap: sub.g.c.iter().fold(0.0, |m: f64, c| m.max(c.abs())) + self.error,
+        }
     }
 
     /// Whether all gradients of the cell point into one open half-plane: no critical point, no loop.

@@ -18,6 +18,7 @@ use super::correct::{Condition, PointPair};
 use super::junction::{Contacted, arms_of};
 use super::output;
 use super::piece::Patch;
+use super::region::{self, CoincidentRegion};
 use super::result::{Counts, CurveEnd, Intersection, Times, Unresolved};
 use super::side::{Frame, Side};
 use super::trace::{Disc, End, Mode, TraceNode, TraceOptions, Tracer};
@@ -131,6 +132,7 @@ pub fn intersect(
         chains: Vec::new(),
         register: HashMap::new(),
         border_segments: Vec::new(),
+        regions: Vec::new(),
         unresolved: Vec::new(),
     };
     job.phase("Finding where the surfaces meet");
@@ -176,6 +178,8 @@ pub struct Engine {
     pub chains: Vec<Chain>,
     register: HashMap<(usize, usize), Vec<(usize, usize)>>,
     border_segments: Vec<(usize, usize)>,
+    /// Where the surfaces coincide.
+    pub regions: Vec<CoincidentRegion>,
     /// What could not be decided.
     pub unresolved: Vec<Unresolved>,
 }
@@ -215,6 +219,7 @@ impl Engine {
             self.trace_arc(arc);
             job.progress(0.5 + 0.5 * (k + traversal.findings.seeds.len()) as f64 / total);
         }
+        self.regions = region::regions(self, &traversal.findings.coincident);
         self.settle_undecided(&traversal.findings.undecided);
     }
 

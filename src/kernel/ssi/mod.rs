@@ -14,6 +14,7 @@ pub mod engine;
 mod junction;
 mod output;
 mod piece;
+mod region;
 pub mod result;
 mod side;
 mod trace;

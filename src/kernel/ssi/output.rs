@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::correct::{Condition, PointPair};
 use super::engine::{Chain, Engine};
-use super::result::{CurveEnd, CurveKind, CurvePoint, Intersection, IntersectionCurve, Junction, JunctionKind};
+use super::result::{CurveEnd, CurveKind, CurvePoint, Intersection, IntersectionCurve, Junction, JunctionKind, Region};
 use super::trace::{Mode, TraceNode, Tracer, hermite};
 
 /// The largest number of points between two traced ones.
@@ -13,7 +13,7 @@ const MOST_BETWEEN: usize = 512;
 /// Everything in model units.
 pub fn assemble(engine: &Engine, tol: f64) -> Intersection {
     let tracer = Tracer { sides: [&engine.sides[0], &engine.sides[1]], options: engine.trace, discs: &[] };
-    let curves: Vec<IntersectionCurve> =
+    let mut curves: Vec<IntersectionCurve> =
         engine.chains.iter().filter(|c| c.nodes.len() > 1).map(|chain| curve(engine, &tracer, chain, tol)).collect();
     let junctions = engine
         .contacts
@@ -38,11 +38,31 @@ pub fn assemble(engine: &Engine, tol: f64) -> Intersection {
             Junction { xyz: point.xyz, a: point.a, uv: point.uv, b: point.b, st: point.st, gap, kind }
         })
         .collect();
+    let mut regions = Vec::new();
+    for (k, region) in engine.regions.iter().enumerate() {
+        let boundary: Vec<Vec<CurvePoint>> =
+            region.loops.iter().map(|l| l.iter().map(|q| super::region::point_of(engine, q)).collect()).collect();
+        let max_distance = region.distance / engine.frame.scale;
+        for points in &boundary {
+            curves.push(IntersectionCurve {
+                kind: CurveKind::CoincidentBoundary,
+                closed: true,
+                ends: [CurveEnd::Loop; 2],
+                end_ids: [None; 2],
+                // The polylines were sampled to this sag.
+                error_bound: max_distance + tol,
+                region: Some(k),
+                points: points.clone(),
+            });
+        }
+        regions.push(Region { boundary, max_distance });
+    }
     Intersection {
         complete: engine.unresolved.is_empty(),
         tol,
         curves,
         junctions,
+        regions,
         unresolved: engine.unresolved.clone(),
         ..Intersection::default()
     }

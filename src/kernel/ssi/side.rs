@@ -192,8 +192,14 @@ impl Side {
 /// The closest point of a piece by Gauss-Newton steps, clamped to [0, 1]^2, from the best of a few samples.
 pub fn closest(piece: &Piece, p: DVec3) -> Option<(DVec2, f64)> {
     let samples = (0..=6).flat_map(|i| (0..=6).map(move |j| DVec2::new(f64::from(i) / 6.0, f64::from(j) / 6.0)));
-    let mut uv =
+    let start =
         samples.min_by(|&x, &y| piece.point(x).distance_squared(p).total_cmp(&piece.point(y).distance_squared(p)))?;
+    Some(closest_from(piece, p, start))
+}
+
+/// The same from a start.
+pub fn closest_from(piece: &Piece, p: DVec3, start: DVec2) -> (DVec2, f64) {
+    let mut uv = start;
     for _ in 0..30 {
         let jet = piece.jet1(uv);
         let r = jet.p - p;
@@ -217,7 +223,7 @@ pub fn closest(piece: &Piece, p: DVec3) -> Option<(DVec2, f64)> {
             break;
         }
     }
-    Some((uv, piece.point(uv).distance(p)))
+    (uv, piece.point(uv).distance(p))
 }
 
 fn edge_bounds(piece: &Piece, fixed: usize, value: f64) -> Aabb {

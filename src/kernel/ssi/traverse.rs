@@ -39,6 +39,8 @@ pub struct Traversal {
 
 /// Nodes that bend less than this (radians) may be described by a gap function.
 const FLAT: f64 = 0.25;
+/// Feet that enter a piece by less than this only touch its border.
+const BORDER: f64 = 1e-9;
 /// Pairs of nodes smaller than this are given up.
 const SMALLEST: f64 = 1e-9;
 /// More pairs than this and the rest is unresolved.
@@ -84,8 +86,15 @@ pub fn traverse(sides: [&Side; 2], trees: &mut [Tree; 2], gap: f64, job: &Job) -
                     }
                     let (piece_a, piece_b) = (&sides[0].pieces[a.piece], &sides[1].pieces[b.piece]);
                     out.fits += 1;
+                    // What lies on a border within a surface belongs to the piece beyond as well, and is left to it.
+                    let left_to_others = |c: &Contact| {
+                        (0..2).any(|k| {
+                            (c.feet[1][k] < BORDER && sides[1].neighbour(c.pb, k, 0.0).is_some())
+                                || (c.feet[0][k] > 1.0 - BORDER && sides[1].neighbour(c.pb, k, 1.0).is_some())
+                        })
+                    };
                     if let Some(contact) = contact::fit(piece_a, a, piece_b, b)
-                        && contact.analyse(gap, &mut out.findings)
+                        && (left_to_others(&contact) || contact.analyse(gap, &mut out.findings))
                     {
                         let key = (ia, contact.pb);
                         fits.entry(key).or_default().push(contact);
