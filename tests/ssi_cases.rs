@@ -57,7 +57,17 @@ fn show() {
     let Some(case) = Case::load(&std::env::var("CASE").unwrap_or_default()) else { return };
     let [a, b] = case.sides();
     let result = intersect(&a, &b, &SsiOptions::default(), &Job::new()).unwrap();
-    println!("{:?} complete {}, {} regions {:?}", result.counts, result.complete, result.regions.len(), result.regions.iter().map(|r| (r.max_distance, r.boundary.iter().map(Vec::len).collect::<Vec<_>>())).collect::<Vec<_>>());
+    println!(
+        "{:?} complete {}, {} regions {:?}",
+        result.counts,
+        result.complete,
+        result.regions.len(),
+        result
+            .regions
+            .iter()
+            .map(|r| (r.max_distance, r.boundary.iter().map(Vec::len).collect::<Vec<_>>()))
+            .collect::<Vec<_>>()
+    );
     for j in &result.junctions {
         println!("junction {j:?}");
     }

@@ -94,11 +94,8 @@ pub fn faults(result: &Intersection, oracle: &Value) -> Vec<String> {
     }
     if let Some(boundary) = oracle["overlap_boundary"].as_array() {
         let boundary = points(&Value::Array(boundary.clone()));
-        let lines: Vec<Vec<DVec3>> = result
-            .regions
-            .iter()
-            .flat_map(|r| r.boundary.iter().map(|l| l.iter().map(|p| p.xyz).collect()))
-            .collect();
+        let lines: Vec<Vec<DVec3>> =
+            result.regions.iter().flat_map(|r| r.boundary.iter().map(|l| l.iter().map(|p| p.xyz).collect())).collect();
         if lines.len() != 1 {
             out.push(format!("{} region boundaries, expected 1", lines.len()));
         } else {

@@ -43,7 +43,7 @@ fn matrix(n: usize) -> &'static [f64] {
         let size = n + 1;
         let mut rows: Vec<Vec<f64>> = (0..size)
             .map(|k| {
-                let mut row = basis(n, chebyshev_node(n.max(1), k));
+                let mut row = basis(n, chebyshev_node(n.max(1), k))[..=n].to_vec();
                 row.extend((0..size).map(|j| if j == k { 1.0 } else { 0.0 }));
                 row
             })
@@ -65,8 +65,9 @@ fn matrix(n: usize) -> &'static [f64] {
     })
 }
 
-fn basis(n: usize, t: f64) -> Vec<f64> {
-    let mut b = vec![0.0; n + 1];
+/// The Bernstein polynomials of degree `n <= MAX_FIT`; the entries beyond are zero.
+fn basis(n: usize, t: f64) -> [f64; MAX_FIT + 1] {
+    let mut b = [0.0; MAX_FIT + 1];
     b[0] = 1.0;
     for degree in 0..n {
         let mut carry = 0.0;
@@ -109,22 +110,21 @@ impl Poly2 {
     pub fn eval(&self, x: f64, y: f64) -> Value2 {
         let n = self.n;
         let derivative = |t: f64| {
-            let b0 = basis(n, t);
             let low1 = basis(n - 1, t);
             let low2 = basis(n - 2, t);
-            let mut b1 = vec![0.0; n + 1];
-            let mut b2 = vec![0.0; n + 1];
-            for (i, v) in low1.iter().enumerate() {
-                b1[i] -= v * n as f64;
-                b1[i + 1] += v * n as f64;
+            let (mut b1, mut b2) = ([0.0; MAX_FIT + 1], [0.0; MAX_FIT + 1]);
+            for i in 0..n {
+                let v = low1[i] * n as f64;
+                b1[i] -= v;
+                b1[i + 1] += v;
             }
-            for (i, v) in low2.iter().enumerate() {
-                let v = v * (n * (n - 1)) as f64;
+            for i in 0..n - 1 {
+                let v = low2[i] * (n * (n - 1)) as f64;
                 b2[i] += v;
                 b2[i + 1] -= 2.0 * v;
                 b2[i + 2] += v;
             }
-            [b0, b1, b2]
+            [basis(n, t), b1, b2]
         };
         let (bx, by) = (derivative(x), derivative(y));
         let mut out = Value2::default();

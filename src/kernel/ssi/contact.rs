@@ -212,6 +212,8 @@ struct Affine {
     c: f64,
     d: DVec2,
     r: f64,
+    /// Bounds of the second derivatives xx, xy, yy.
+    h: [f64; 3],
 }
 
 impl Affine {
@@ -227,13 +229,27 @@ impl Affine {
                 r = r.max((at(i, j) - c - (d.x * i as f64 + d.y * j as f64) / n as f64).abs());
             }
         }
-        Self { c, d, r }
+        let h = p.hessian_range().map(|r| r[0].abs().max(r[1].abs()));
+        Self { c, d, r, h }
     }
 
-    fn range(&self, low: DVec2, size: DVec2) -> [f64; 2] {
-        let middle = self.c + self.d.dot(low + 0.5 * size);
-        let half = 0.5 * self.d.abs().dot(size) + self.r;
-        [middle - half, middle + half]
+    /// Whether the values over a rectangle lie outside [0, 1] or only touch its ends: what lies on a border belongs
+    /// to what is inside of it.
+    fn outside(&self, p: &Poly2, low: DVec2, size: DVec2, touch: f64) -> bool {
+        let beyond = |middle: f64, half: f64| middle - half > 1.0 - touch || middle + half < touch;
+        let at = low + 0.5 * size;
+        let (middle, half) = (self.c + self.d.dot(at), 0.5 * self.d.abs().dot(size));
+        if beyond(middle, half + self.r) {
+            return true;
+        }
+        if !beyond(middle, half - self.r) {
+            return false;
+        }
+        // Close to an end: second order, with bounds of the second derivatives.
+        let v = p.eval(at.x, at.y);
+        let h = 0.5 * size;
+        let bend = 0.5 * (self.h[0] * h.x * h.x + 2.0 * self.h[1] * h.x * h.y + self.h[2] * h.y * h.y);
+        beyond(v.f, v.d[0].abs() * h.x + v.d[1].abs() * h.y + bend)
     }
 }
 
@@ -260,16 +276,14 @@ impl Contact {
             if count > MOST_CELLS {
                 return false;
             }
-            let outside = |r: [f64; 2]| r[0] > 1.0 + SLACK || r[1] < -SLACK;
-            if outside(s.range(sub.low, sub.size)) || outside(t.range(sub.low, sub.size)) {
+            let outside = |touch: f64| {
+                s.outside(&self.s, sub.low, sub.size, touch) || t.outside(&self.t, sub.low, sub.size, touch)
+            };
+            if outside(1e-9) {
                 continue;
             }
             let [min, max] = sub.g.range();
             if min > contact + self.error || max < -contact - self.error {
-                continue;
-            }
-            if min >= -contact - self.error && max <= contact + self.error {
-                found.coincident.push(self.cell(&sub));
                 continue;
             }
             if self.regular(&sub) {
@@ -278,6 +292,15 @@ impl Contact {
             }
             let size = sub.size.max_element();
             if self.one_critical(&sub, contact, &mut found) || self.ridge(&sub, contact, &mut found) {
+                continue;
+            }
+            // Only what no derivative tells apart is coincident.
+            if min >= -contact - self.error && max <= contact + self.error {
+                // A sliver along the border is no area.
+                if outside(1e-6) {
+                    continue;
+                }
+                found.coincident.push(self.cell(&sub));
                 continue;
             }
             if size < SMALLEST {

@@ -15,7 +15,7 @@ use glam::{DVec2, DVec3};
 use super::binormal;
 use super::contact::{Cell, Findings, SLACK, Seed};
 use super::correct::{Condition, PointPair};
-use super::junction::{Contacted, arms_of};
+use super::junction::{Contacted, arms_of, is_point};
 use super::output;
 use super::piece::Patch;
 use super::region::{self, CoincidentRegion};
@@ -126,6 +126,7 @@ pub fn intersect(
             tol: 0.25 * tol * frame.scale,
             floor: 4e-16 * frame.scale * (bounds.max_abs() + diagonal),
             joining: joining * frame.scale,
+            contact: gap_tol * frame.scale,
             most_points: 200_000,
         },
         contacts: Vec::new(),
@@ -192,6 +193,7 @@ impl Engine {
             self.unresolved.push(entry);
         }
         self.find_contacts(&traversal.findings);
+        let (coincident, undecided) = self.flat_contacts(&traversal.findings);
         for contact in 0..self.contacts.len() {
             for arm in 0..self.contacts[contact].arms.len() {
                 if !self.contacts[contact].arms[arm].used {
@@ -219,8 +221,11 @@ impl Engine {
             self.trace_arc(arc);
             job.progress(0.5 + 0.5 * (k + traversal.findings.seeds.len()) as f64 / total);
         }
-        self.regions = region::regions(self, &traversal.findings.coincident);
-        self.settle_undecided(&traversal.findings.undecided);
+        self.regions = region::regions(self, &coincident);
+        if self.regions.is_empty() {
+            self.settle_undecided(&coincident);
+        }
+        self.settle_undecided(&undecided);
     }
 
     fn cancelled(&mut self) {
@@ -277,13 +282,85 @@ impl Engine {
             let radius = others.fold(0.02, |r: f64, d| r.min(0.3 * d));
             let at = point.at;
             if extremum {
-                self.contacts.push(Contacted { binormal: point, pair, radius, arms: Vec::new() });
+                self.contacts.push(Contacted { binormal: point, pair, radius: 1e-7, arms: Vec::new() });
                 continue;
             }
             match arms_of([&self.sides[0], &self.sides[1]], point, pair, radius, self.trace.joining) {
                 Some(contact) => self.contacts.push(contact),
                 None => self.give_up(pair, at, "the arms of a junction could not be told apart"),
             }
+        }
+    }
+
+    /// Contacts of higher order: clusters of cells in which the gap vanishes or nothing was decided, with an open gap
+    /// all around. Returns the cells that are left.
+    fn flat_contacts(&mut self, findings: &Findings) -> (Vec<Cell>, Vec<Cell>) {
+        let cells: Vec<&Cell> = findings.coincident.iter().chain(&findings.undecided).collect();
+        let place = |c: &Cell| {
+            let piece = &self.sides[0].pieces[c.pa];
+            let p = piece.point(c.middle.uv);
+            (p, p.distance(piece.point(c.low)).max(p.distance(piece.point(c.high))))
+        };
+        let places: Vec<(DVec3, f64)> = cells.iter().map(|c| place(c)).collect();
+        // Cells that touch belong together. Large cells are regions, never points.
+        let mut cluster = vec![usize::MAX; cells.len()];
+        let mut clusters: Vec<Vec<usize>> = Vec::new();
+        for start in 0..cells.len() {
+            if cluster[start] != usize::MAX {
+                continue;
+            }
+            cluster[start] = clusters.len();
+            let (mut members, mut next) = (vec![start], 0);
+            while next < members.len() {
+                let (p, r) = places[members[next]];
+                for other in 0..cells.len() {
+                    let (q, s) = places[other];
+                    if cluster[other] == usize::MAX && p.distance(q) < 1.2 * (r + s) + 1e-9 {
+                        cluster[other] = clusters.len();
+                        members.push(other);
+                    }
+                }
+                next += 1;
+            }
+            clusters.push(members);
+        }
+        let mut done = vec![false; cells.len()];
+        for members in clusters {
+            let center = members.iter().map(|&m| places[m].0).sum::<DVec3>() / members.len() as f64;
+            let extent = members.iter().map(|&m| places[m].0.distance(center) + places[m].1).fold(0.0, f64::max);
+            if extent > 0.02 {
+                continue;
+            }
+            let nearest =
+                members.iter().min_by(|&&x, &&y| places[x].0.distance(center).total_cmp(&places[y].0.distance(center)));
+            if nearest.is_some_and(|&m| self.flat_contact([cells[m].pa, cells[m].pb], cells[m].middle, extent)) {
+                members.iter().for_each(|&m| done[m] = true);
+            }
+        }
+        let split = findings.coincident.len();
+        let left = |range: std::ops::Range<usize>| range.filter(|&k| !done[k]).map(|k| *cells[k]).collect();
+        (left(0..split), left(split..cells.len()))
+    }
+
+    /// Takes a small closed spot for a point contact when the gap is open around it.
+    fn flat_contact(&mut self, pair: [usize; 2], at: PointPair, extent: f64) -> bool {
+        let (a, b) = (&self.sides[0].pieces[pair[0]], &self.sides[1].pieces[pair[1]]);
+        let Some((point, _)) = binormal::look(a, b, at) else { return false };
+        let sides = [&self.sides[0], &self.sides[1]];
+        let mut radius = (2.0 * extent).max(1e-3);
+        let joining = self.trace.joining;
+        while !is_point(sides, &point, pair, 0.25 * radius, joining, self.gap) {
+            radius *= 1.5;
+            if radius > 0.2 {
+                return false;
+            }
+        }
+        match arms_of(sides, point, pair, radius, joining) {
+            Some(contact) if contact.radius > 0.9 * radius => {
+                self.contacts.push(contact);
+                true
+            }
+            _ => false,
         }
     }
 
@@ -376,8 +453,7 @@ impl Engine {
 
     /// Whether a point lies on a curve that was traced, or in the disc of a junction.
     fn known(&self, node: &TraceNode, mode: Mode) -> bool {
-        if self.contacts.iter().any(|c| c.binormal.p.distance(node.p) < if c.arms.is_empty() { 1e-7 } else { c.radius })
-        {
+        if self.contacts.iter().any(|c| c.binormal.p.distance(node.p) < c.radius) {
             return true;
         }
         self.with_tracer(|tracer| {
@@ -449,9 +525,31 @@ impl Engine {
             tracer.locate(Mode::Tangential, [seed.pa, seed.pb], seed.at, none, DVec3::X)
         });
         match found {
-            Some(node) if Self::inside(&node) => self.trace_both(Mode::Tangential, node),
+            Some(node) if Self::inside(&node) => {
+                if self.known(&node, Mode::Tangential) {
+                    return;
+                }
+                let (chains, unresolved) = (self.chains.len(), self.unresolved.len());
+                self.trace_both(Mode::Tangential, node);
+                // A short stretch that fades out at both ends is a flat contact.
+                let Some(chain) = self.chains.get(chains) else { return };
+                let faded = chain.ends.iter().all(|e| e.end == CurveEnd::Unresolved);
+                let far = chain.nodes.iter().map(|n| n.p.distance(node.p)).fold(0.0, f64::max);
+                let middle = chain.nodes[chain.nodes.len() / 2];
+                if faded && far < 0.02 && self.flat_contact([middle.pa, middle.pb], middle.at, far) {
+                    self.chains.truncate(chains);
+                    self.unresolved.truncate(unresolved);
+                    self.register.values_mut().for_each(|list| list.retain(|&(chain, _)| chain < chains));
+                    self.border_segments.retain(|&(chain, _)| chain < chains);
+                }
+            }
             Some(_) => {}
-            None => self.give_up([seed.pa, seed.pb], seed.at, "a point of contact could not be polished"),
+            None => {
+                let p = self.sides[0].pieces[seed.pa].point(seed.at.uv);
+                if !self.contacts.iter().any(|c| c.binormal.p.distance(p) < c.radius.max(1e-6)) {
+                    self.give_up([seed.pa, seed.pb], seed.at, "a point of contact could not be polished");
+                }
+            }
         }
     }
 

@@ -131,14 +131,7 @@ pub fn arms_of(
     mut radius: f64,
     joining: f64,
 ) -> Option<Contacted> {
-    let places = [sides[0].around(binormal.p, joining), sides[1].around(binormal.p, joining)];
-    let own = [Place { piece: pair[0], uv: binormal.at.uv }, Place { piece: pair[1], uv: binormal.at.st }];
-    let places = [0, 1].map(|k| {
-        let mut list = vec![own[k]];
-        list.extend(places[k].iter().filter(|p| p.piece != own[k].piece));
-        list
-    });
-    let ring = Ring { sides, center: binormal.p, n: binormal.n, frame: binormal.frame, places };
+    let ring = ring_around(sides, &binormal, pair, joining);
     // Evenly spread angles, and the middles of the lobes that the second-order form predicts.
     let mut angles: Vec<f64> = (0..64).map(|k| f64::from(k) * std::f64::consts::TAU / 64.0 + 0.003).collect();
     let (_, e, _) = binormal.principal();
@@ -172,6 +165,27 @@ pub fn arms_of(
         radius *= 0.5;
     }
     None
+}
+
+/// Whether the gap is clearly open on nearly all of a circle: what is closed inside it is a point contact.
+pub fn is_point(sides: [&Side; 2], binormal: &Binormal, pair: [usize; 2], radius: f64, joining: f64, gap: f64) -> bool {
+    let ring = ring_around(sides, binormal, pair, joining);
+    let open = (0..32).filter(|&k| {
+        let s = ring.sample(f64::from(k) * std::f64::consts::TAU / 32.0 + 0.01, radius);
+        s.is_some_and(|s| s.gap.abs() > 4.0 * gap)
+    });
+    open.count() >= 24
+}
+
+fn ring_around<'a>(sides: [&'a Side; 2], binormal: &Binormal, pair: [usize; 2], joining: f64) -> Ring<'a> {
+    let places = [sides[0].around(binormal.p, joining), sides[1].around(binormal.p, joining)];
+    let own = [Place { piece: pair[0], uv: binormal.at.uv }, Place { piece: pair[1], uv: binormal.at.st }];
+    let places = [0, 1].map(|k| {
+        let mut list = vec![own[k]];
+        list.extend(places[k].iter().filter(|p| p.piece != own[k].piece));
+        list
+    });
+    Ring { sides, center: binormal.p, n: binormal.n, frame: binormal.frame, places }
 }
 
 /// Whether the whole circle lies on both sides.

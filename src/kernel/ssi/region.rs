@@ -79,6 +79,15 @@ pub fn regions(engine: &Engine, cells: &[Cell]) -> Vec<CoincidentRegion> {
     }
     let loops = chain(kept);
     let distance = cells.iter().map(|c| c.gap).fold(0.0, f64::max);
+    if loops.is_empty() {
+        // Coincident all over closed surfaces: a region without boundary.
+        let mut whole: Vec<usize> = cells.iter().map(|c| c.pa).collect();
+        whole.sort_unstable();
+        whole.dedup();
+        let area: f64 = cells.iter().map(|c| (c.high - c.low).element_product()).sum();
+        let closed = area > 0.9 * whole.len() as f64;
+        return if closed { vec![CoincidentRegion { loops, distance }] } else { Vec::new() };
+    }
     group(loops, distance, engine)
 }
 
@@ -189,6 +198,12 @@ impl Finder<'_> {
     }
 }
 
+/// Whether two points have the same parameters on both sides (not so across seams and shared edges).
+fn same_place(x: &RegionPoint, y: &RegionPoint) -> bool {
+    let same = |p: &Place, q: &Place| p.piece == q.piece && p.uv.distance(q.uv) < 1e-6;
+    same(&x.a, &y.a) && same(&x.b, &y.b)
+}
+
 /// Chains stretches with common ends into closed loops; what does not close is dropped.
 fn chain(mut pieces: Vec<Vec<RegionPoint>>) -> Vec<Vec<RegionPoint>> {
     let mut loops = Vec::new();
@@ -196,7 +211,9 @@ fn chain(mut pieces: Vec<Vec<RegionPoint>>) -> Vec<Vec<RegionPoint>> {
         loop {
             let (Some(first), Some(last)) = (line.first().copied(), line.last().copied()) else { break };
             if line.len() > 3 && first.p.distance(last.p) < JOINED {
-                line.pop();
+                if same_place(&first, &last) {
+                    line.pop();
+                }
                 line.push(first);
                 loops.push(line);
                 break;
@@ -210,7 +227,8 @@ fn chain(mut pieces: Vec<Vec<RegionPoint>>) -> Vec<Vec<RegionPoint>> {
             if more.last().is_some_and(|b| b.p.distance(last.p) < JOINED) {
                 more.reverse();
             }
-            line.extend(more.into_iter().skip(1));
+            let repeated = more.first().is_some_and(|next| same_place(next, &last));
+            line.extend(more.into_iter().skip(usize::from(repeated)));
         }
     }
     loops
@@ -242,7 +260,18 @@ fn group(mut loops: Vec<Vec<RegionPoint>>, distance: f64, engine: &Engine) -> Ve
                     % 2
                     == 1
         };
+        // Loops around a closed surface bound one region together, though neither contains the other.
+        let around = |l: &Vec<RegionPoint>| {
+            l.windows(2).any(|w| {
+                let (x, y) = (&engine.sides[0].pieces[w[0].a.piece], &engine.sides[0].pieces[w[1].a.piece]);
+                let far = (x.to_surface(w[0].a.uv) - y.to_surface(w[1].a.uv)).abs().max_element();
+                x.surface == y.surface && w[0].p.distance(w[1].p) < JOINED && far > 1e-3
+            })
+        };
         let home = out.iter().position(|r| r.loops.first().is_some_and(inside));
+        let home = home.or_else(|| {
+            if around(&line) { out.iter().position(|r| r.loops.first().is_some_and(around)) } else { None }
+        });
         let wanted = if home.is_some() { -1.0 } else { 1.0 };
         if area(engine, &line) * wanted < 0.0 {
             line.reverse();
@@ -251,10 +280,6 @@ fn group(mut loops: Vec<Vec<RegionPoint>>, distance: f64, engine: &Engine) -> Ve
             Some(home) => out[home].loops.push(line),
             None => out.push(CoincidentRegion { loops: vec![line], distance }),
         }
-    }
-    if out.is_empty() {
-        // Coincident all over closed surfaces: a region without boundary.
-        out.push(CoincidentRegion { loops: Vec::new(), distance });
     }
     out
 }

@@ -82,6 +82,8 @@ pub struct TraceOptions {
     pub floor: f64,
     /// How far apart the borders of neighbouring pieces may be.
     pub joining: f64,
+    /// The distance that counts as contact.
+    pub contact: f64,
     /// The largest number of points of one curve.
     pub most_points: usize,
 }
@@ -168,6 +170,9 @@ impl Tracer<'_> {
             }
             Mode::Tangential => {
                 let found = binormal::polish(a, b, start, 0.05, true)?;
+                if found.gap.abs() > 4.0 * self.options.contact {
+                    return None;
+                }
                 let (_, e, _) = found.principal();
                 let t = found.in_space(e.perp());
                 (found.at, found.p, t, a.jet1(found.at.uv), b.jet1(found.at.st), 1.0)
