@@ -7,6 +7,7 @@ use super::corners::trim_at;
 use super::piece::{Picked, PieceError};
 use super::{PatchTool, Stage, sentence};
 use crate::view::display::CurveRef;
+use crate::view::feature_edges::EdgeKind;
 use crate::view::scene::{ItemKind, Scene};
 
 /// T follows curves that turn by less than this, in degrees.
@@ -143,7 +144,10 @@ impl PatchTool {
                 if matches!(curve.curve, CurveRef::Iso(..)) || used(&curve.curve) || !ends.iter().any(|p| near(*p)) {
                     continue;
                 }
-                let Ok(piece) = Picked::of_curve(scene, curve.curve, None, curve.t[0]) else { continue };
+                let n = curve.points.len() - 1;
+                let at = if near(ends[0]) { curve.t[0] } else { curve.t[n] };
+                let stretch = self.edges.at(&curve.curve, at).map(|e| e.range);
+                let Ok(piece) = Picked::of_curve(scene, curve.curve, stretch, at) else { continue };
                 let least = joint_angles(line, &piece, tol).into_iter().map(|(_, a)| a).fold(f64::INFINITY, f64::min);
                 if least <= CHAINS {
                     found.push((least, piece));
@@ -157,6 +161,15 @@ impl PatchTool {
         };
         found.retain(|(_, p)| !beside(&line.points, p));
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // A side of free edges stays on free edges as long as there are any to follow.
+        let open = |p: &Picked| {
+            let Some((curve, [a, b])) = p.stretch() else { return false };
+            self.edges.at(&curve, 0.5 * (a + b)).is_some_and(|e| matches!(e.kind, EdgeKind::Free | EdgeKind::Gap))
+        };
+        let of_side = self.sides.iter().filter_map(|s| arrange::chain(&s.pieces).filter(|l| l == line).map(|_| s));
+        if of_side.take(1).any(|s| s.pieces.iter().all(open)) {
+            found.retain(|(_, p)| open(p));
+        }
         let mut distinct: Vec<(f64, Picked)> = Vec::new();
         for (angle, piece) in found {
             if !distinct.iter().any(|(_, other)| beside(&other.points, &piece) || beside(&piece.points, other)) {

@@ -29,6 +29,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 
 use super::display::CurveRef;
+use super::feature_edges::Edges;
 use super::navigation::Modifiers;
 use super::pick::{Filter, PickHit};
 use super::scene::Scene;
@@ -276,6 +277,7 @@ pub struct PatchTool {
     result: Option<Arc<Patch>>,
     last: Option<Box<[SidePick; 4]>>,
     count: usize,
+    edges: Arc<Edges>,
     // Made from the above after every event.
     lines: [Option<SideLine>; 4],
     layout: Layout,
@@ -303,11 +305,18 @@ impl PatchTool {
             result: None,
             last: None,
             count: 0,
+            edges: Arc::default(),
             lines: [None, None, None, None],
             layout: Layout::Nothing,
             corners: Vec::new(),
             preview: None,
         }
+    }
+
+    /// Tells it the edges of the model once they are known: a click then takes the stretch of a border that is of one
+    /// kind, and T follows free edges where the side is one.
+    pub fn set_edges(&mut self, edges: Arc<Edges>) {
+        self.edges = edges;
     }
 
     /// Where it is.

@@ -113,7 +113,9 @@ impl PatchTool {
             }
         }
         let domain = scene.curve_item(&curve).and_then(|item| item.geometry.curve_domain(&curve));
-        let range = domain.map(|[a, b]| [a.max(free[0]), b.min(free[1])]);
+        // A border that is only in part free (or open, or shared) is taken in that part.
+        let stretch = self.edges.at(&curve, t).map_or([f64::NEG_INFINITY, f64::INFINITY], |piece| piece.range);
+        let range = domain.map(|[a, b]| [a.max(free[0]).max(stretch[0]), b.min(free[1]).min(stretch[1])]);
         match Picked::of_curve(scene, curve, range, t) {
             Ok(piece) if held.shift => match piece.split(scene, point) {
                 Ok([a, b]) => {

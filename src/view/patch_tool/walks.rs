@@ -349,6 +349,29 @@ fn a_side_of_several_pieces_chains_by_tangency_and_holds_by_its_digit() {
 }
 
 #[test]
+fn with_known_edges_a_click_takes_the_free_stretch_and_t_stays_on_free_edges() {
+    use crate::view::feature_edges::{EdgeOptions, feature_edges};
+    let (mut document, _) = tiles();
+    // A sheet over the left half of the border y = 0.
+    let corner = |x: f64, y: f64| DVec3::new(x, y, 0.0);
+    let sheet = Surface::bilinear([corner(0.0, -1.0), corner(0.5, -1.0), corner(0.0, 0.0), corner(0.5, 0.0)]).unwrap();
+    document.add("sheet", Shape::Surface(Arc::new(sheet)), None);
+    let mut w = Walk::new(document);
+    let options = EdgeOptions::new(w.tool.options().joining_tol);
+    w.tool.set_edges(Arc::new(feature_edges(&w.document, &options, &Job::new())));
+    w.border(0, Side::VMin, 0.9);
+    assert!((w.tool.sides()[0].pieces[0].length() - 0.5).abs() < 0.01, "only the free half");
+    w.key(Key::Chain);
+    // Two more tiles to the right; not back along the sheet, which is shared.
+    assert_eq!(w.counts(), [3, 0, 0, 0], "{}", w.notice());
+    // A border of the hole ends in sharp corners, and what carries on straight is not free.
+    w.key(Key::Enter);
+    w.border(1, Side::VMax, 0.5);
+    w.key(Key::Chain);
+    assert_eq!(w.counts(), [3, 1, 0, 0], "{}", w.notice());
+}
+
+#[test]
 fn shift_click_splits_and_trims_snap_to_the_curve() {
     let mut w = Walk::on_tiles();
     w.border_with(1, Side::VMax, 0.25, Modifiers::SHIFT);
