@@ -38,8 +38,8 @@ const ROWS: [(&str, &str, f64); 24] = [
 
 fn main() {
     println!(
-        "{:30} {:>9} {:>9} {:>8} | {:>7} {:>8} {:>7} {:>7} {:>7} {:>6}",
-        "case", "peer ms", "target", "ours ms", "build", "traverse", "curves", "pairs", "nodes", "points"
+        "{:30} {:>9} {:>9} {:>8} {:>8} | {:>7} {:>8} {:>7} {:>7} {:>7} {:>6}",
+        "case", "peer ms", "target", "ours ms", "best", "build", "traverse", "curves", "pairs", "nodes", "points"
     );
     for (name, peer, target) in ROWS {
         let Some(case) = cases::Case::load(name) else { continue };
@@ -55,8 +55,9 @@ fn main() {
         let Some((ms, result)) = runs.get(runs.len() / 2) else { continue };
         let points: usize = result.curves.iter().map(|c| c.points.len()).sum();
         let t = result.time_ms;
+        let best = runs[0].0;
         println!(
-            "{name:30} {peer:>9} {target:>9} {ms:>8.2} | {:>7.2} {:>8.2} {:>7.2} {:>7} {:>7} {points:>6}",
+            "{name:30} {peer:>9} {target:>9} {ms:>8.2} {best:>8.2} | {:>7.2} {:>8.2} {:>7.2} {:>7} {:>7} {points:>6}",
             t.build, t.traverse, t.curves, result.counts.leaf_pairs, result.counts.nodes_built
         );
     }

@@ -107,7 +107,6 @@ pub struct Findings {
 /// The foot of the point `p` on a piece along `n`, by Newton's method from `start`: parameters and jet.
 pub fn foot_along(piece: &Piece, p: DVec3, frame: [DVec3; 2], start: DVec2) -> Option<(DVec2, super::piece::Jet1)> {
     let mut st = start;
-    let mut last = f64::INFINITY;
     for _ in 0..20 {
         let jet = piece.jet1(st);
         let r = jet.p - p;
@@ -119,15 +118,15 @@ pub fn foot_along(piece: &Piece, p: DVec3, frame: [DVec3; 2], start: DVec2) -> O
         }
         let step = DVec2::new((m[3] * r.x - m[1] * r.y) / det, (m[0] * r.y - m[2] * r.x) / det);
         let length = step.length();
-        // Rounding of the foot is about eps; below it steps only tremble.
-        if length < 1e-15 || (length < 1e-11 && length >= 0.25 * last) {
-            return Some((st, jet));
+        // A last small step is as good as linear: its square is below rounding.
+        if length < 1e-8 {
+            let p = jet.p - jet.u * step.x - jet.v * step.y;
+            return Some((st - step, super::piece::Jet1 { p, ..jet }));
         }
         st -= step * (0.5 / length).min(1.0);
         if st.x.abs() > 8.0 || st.y.abs() > 8.0 {
             return None;
         }
-        last = length;
     }
     None
 }
@@ -162,6 +161,7 @@ pub fn fit(a: &Piece, node: &Node, b: &Piece, other: &Node) -> Option<Contact> {
     };
     // The foot of the middle, then serpentine from there.
     let (_, center) = sample(0.5, 0.5, other.local(DVec2::ZERO))?;
+    let nodes: [f64; DEGREE + 1] = std::array::from_fn(|i| chebyshev_node(DEGREE, i));
     let w = DEGREE + 1;
     let (mut g, mut s, mut t) = (vec![0.0; w * w], vec![0.0; w * w], vec![0.0; w * w]);
     let mut row_start = center;
@@ -175,8 +175,16 @@ pub fn fit(a: &Piece, node: &Node, b: &Piece, other: &Node) -> Option<Contact> {
             if i == DEGREE / 2 + 1 {
                 start = row_start;
             }
-            let (gap, st) = sample(chebyshev_node(DEGREE, i), chebyshev_node(DEGREE, j), start)?;
             let k = j * w + i;
+            // Predict from the two before in the row.
+            let back = if i > DEGREE / 2 { [i - 1, i.saturating_sub(2)] } else { [i + 1, i + 2] };
+            if i + 2 <= DEGREE / 2 || i > DEGREE / 2 {
+                let x = |i: usize| nodes[i];
+                let known = |i: usize| DVec2::new(s[j * w + i], t[j * w + i]);
+                let f = (x(i) - x(back[0])) / (x(back[0]) - x(back[1]));
+                start = known(back[0]) + (known(back[0]) - known(back[1])) * f;
+            }
+            let (gap, st) = sample(nodes[i], nodes[j], start)?;
             (g[k], s[k], t[k]) = (gap, st.x, st.y);
             start = st;
             if i == DEGREE / 2 {

@@ -38,7 +38,7 @@ pub struct Traversal {
 }
 
 /// Nodes that bend less than this (radians) may be described by a gap function.
-const FLAT: f64 = 0.25;
+const FLAT: f64 = 0.4;
 /// Feet that enter a piece by less than this only touch its border.
 const BORDER: f64 = 1e-9;
 /// Pairs of nodes smaller than this are given up.
