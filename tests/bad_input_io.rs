@@ -14,7 +14,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use iges_text::{Entity, File, shared_files, square};
-use patchwright::io::{self, Opened, iges, project};
+use patchwright::io::{self, Opened, iges, project, step};
 use patchwright::kernel::geom::{Knots, Surface};
 use patchwright::model::document::{Document, Shape, Unit};
 
@@ -286,6 +286,31 @@ fn references_in_circles_and_cascades_end() {
     let opened = read_iges(file.text().as_bytes()).unwrap();
     assert!(opened.report.surfaces > 1 && opened.report.surfaces < 1000);
     assert!(opened.report.lines.iter().any(|l| l.reason.contains("not opened at all of its places")));
+}
+
+#[test]
+fn damaged_step_files_do_no_harm() {
+    let mut state = 11;
+    let files = shared_files("models", "stp").into_iter().chain(shared_files("models", "step"));
+    for bytes in files.map(|path| std::fs::read(path).unwrap()) {
+        for percent in (1..100).step_by(3) {
+            checked(&step::open(&bytes[..bytes.len() * percent / 100]));
+        }
+        for round in 0..20 {
+            let mut bad = bytes.clone();
+            for _ in 0..=random(&mut state) % 50 {
+                let at = random(&mut state) as usize % bad.len();
+                match round % 3 {
+                    0 => bad[at] ^= 1 << (random(&mut state) % 8),
+                    1 => bad[at] = b"0123456789,;.#()'$*E-"[random(&mut state) as usize % 21],
+                    _ => drop(bad.remove(at)),
+                }
+            }
+            let (opened, peak) = peak(|| step::open(&bad));
+            checked(&opened);
+            assert!(peak <= 30 * bad.len() + 100_000, "{peak} bytes for a file of {}", bad.len());
+        }
+    }
 }
 
 fn project_text() -> String {
