@@ -91,6 +91,9 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
     for warning in job.warnings() {
         common.warn(format!("warning: {warning}"));
     }
+    if healing.patches.is_empty() {
+        return Err(CliError::failed("stopped before the first resolution was finished; nothing was written"));
+    }
     tell(&healing, common);
     let saved = io::save(&args.out, &output(&document, &healing, args.with_originals), &SaveOptions::default())?;
     common.say(format!("{} entities written to {}", saved.entities, args.out.display()));

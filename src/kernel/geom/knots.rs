@@ -214,10 +214,18 @@ impl Knots {
 
     /// The same on the polynomial piece of a given non-empty span, whichever side of it `t` is on.
     pub fn basis_on(&self, span: usize, t: f64, order: usize) -> Basis {
-        const N: usize = MAX_DEGREE + 1;
+        // The work space is as large as the degree asks for: clearing that of degree 31 costs more than all of a cubic.
+        match self.degree {
+            0..=3 => self.basis_in::<4>(span, t, order),
+            4..=7 => self.basis_in::<8>(span, t, order),
+            _ => self.basis_in::<{ MAX_DEGREE + 1 }>(span, t, order),
+        }
+    }
+
+    fn basis_in<const N: usize>(&self, span: usize, t: f64, order: usize) -> Basis {
         let (p, u) = (self.degree, &self.values);
         let mut ndu = [[0.0; N]; N];
-        let (mut left, mut right) = ([0.0; N + 1], [0.0; N + 1]);
+        let (mut left, mut right) = ([0.0; N], [0.0; N]);
         ndu[0][0] = 1.0;
         for j in 1..=p {
             left[j] = t - u[span + 1 - j];
@@ -231,7 +239,7 @@ impl Knots {
             }
             ndu[j][j] = saved;
         }
-        let mut d = [[0.0; N]; MAX_DERIVATIVE + 1];
+        let mut d = [[0.0; MAX_DEGREE + 1]; MAX_DERIVATIVE + 1];
         for j in 0..=p {
             d[0][j] = ndu[j][p];
         }

@@ -84,7 +84,7 @@ pub struct HealOptions {
 }
 
 impl HealOptions {
-    /// The defaults for a model with this bounding box: joining 1e-3, error 1e-4, chords 1e-4 of the diagonal.
+    /// The defaults for a model with this bounding box: joining 1e-3, error 1e-4, chords 5e-4 of the diagonal.
     pub fn of(bounds: &Aabb) -> Self {
         let diagonal = if bounds.diagonal() > 0.0 { bounds.diagonal() } else { 1.0 };
         Self {
@@ -95,7 +95,7 @@ impl HealOptions {
             slab: None,
             hardy: HardyOptions::default(),
             twist: fit::Twist::Scheme,
-            chord_tol: 1e-4 * diagonal,
+            chord_tol: 5e-4 * diagonal,
         }
     }
 }

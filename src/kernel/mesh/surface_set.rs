@@ -33,6 +33,8 @@ pub struct SurfaceSet {
     numbers: Vec<usize>,
     closed: Vec<Closed>,
     tree: TriTree,
+    /// The triangles at borders, and their numbers in `tree`.
+    border: (TriTree, Vec<u32>),
     uv: Vec<DVec2>,
     triangles: Vec<[u32; 3]>,
     /// The first triangle of every surface.
@@ -89,6 +91,7 @@ impl SurfaceSet {
             numbers: Vec::new(),
             closed: Vec::new(),
             tree: TriTree::default(),
+            border: (TriTree::default(), Vec::new()),
             uv: Vec::new(),
             triangles: Vec::new(),
             first: Vec::new(),
@@ -100,10 +103,18 @@ impl SurfaceSet {
         for ((number, surface), mesh) in surfaces.into_iter().zip(meshes) {
             let Some((mesh, closed)) = mesh else { break };
             let base = points.len() as u32;
+            let first = set.triangles.len() as u32;
+            let [u, v] = surface.domain();
+            let at_border = |k: u32| {
+                let uv = mesh.uv[k as usize];
+                u.contains(&uv.x) || v.contains(&uv.y)
+            };
+            let on_border = mesh.triangles.iter().enumerate().filter(|(_, t)| t.iter().any(|&k| at_border(k)));
+            set.border.1.extend(on_border.map(|(k, _)| first + k as u32));
             if mesh.capped {
                 set.capped.push(number);
             }
-            set.first.push(set.triangles.len() as u32);
+            set.first.push(first);
             set.triangles.extend(mesh.triangles.iter().map(|t| t.map(|k| k + base)));
             points.extend(mesh.points);
             set.uv.extend(mesh.uv);
@@ -112,6 +123,10 @@ impl SurfaceSet {
             set.closed.push(closed);
         }
         set.diagonal = Aabb::of(points.iter().copied()).diagonal();
+        let corners: Vec<DVec3> =
+            (set.border.1.iter()).flat_map(|&t| set.triangles[t as usize].map(|k| points[k as usize])).collect();
+        let own: Vec<[u32; 3]> = (0..set.border.1.len() as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+        set.border.0 = TriTree::new(corners, &own);
         set.tree = TriTree::new(points, &set.triangles);
         set
     }
@@ -196,9 +211,10 @@ impl SurfaceSet {
             self.polish(index, uv, a, b, &mut out);
         }
         // Where a curved border reaches past its chords, the triangles miss what the surface does not.
-        self.tree.near_segment(a, b, self.chord_tol, &mut scratch.ids);
+        self.border.0.near_segment(a, b, self.chord_tol, &mut scratch.ids);
         let mut tried = 0;
-        for &triangle in &scratch.ids {
+        for &id in &scratch.ids {
+            let triangle = self.border.1[id as usize];
             let (index, uv) = self.place(triangle, DVec3::splat(1.0 / 3.0));
             let known = out.iter().any(|(i, h)| *i == index && self.beside(triangle, h.uv));
             if !known && tried < CANDIDATES {
