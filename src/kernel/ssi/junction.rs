@@ -118,6 +118,7 @@ impl Ring<'_> {
             tangent: DVec3::ZERO,
             rates: [0.0; 4],
             sine: 1.0,
+            sense: 0.0,
         })
     }
 }
@@ -213,6 +214,7 @@ fn arm(ring: &Ring<'_>, radius: f64, angles: [f64; 3]) -> Option<Arm> {
             tangent: DVec3::ZERO,
             rates: [0.0; 4],
             sine: 1.0,
+            sense: 0.0,
         });
     }
     // Tangents from the parabola through the neighbours.

@@ -27,6 +27,7 @@ pub fn assemble(engine: &Engine, tol: f64) -> Intersection {
                 tangent: glam::DVec3::ZERO,
                 rates: [0.0; 4],
                 sine: 1.0,
+                sense: 0.0,
             };
             let point = point_of(engine, &node);
             let kind = match contact.arms.len() {

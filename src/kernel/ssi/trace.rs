@@ -34,6 +34,8 @@ pub struct TraceNode {
     pub rates: [f64; 4],
     /// The sine of the angle between the surfaces, at least [`LEAST_SINE`].
     pub sine: f64,
+    /// The sign of the tangent against N_A x N_B; 0 on tangential curves.
+    pub sense: f64,
 }
 
 /// The smallest sine of an angle that is told from 0.
@@ -102,7 +104,7 @@ impl TraceNode {
     /// The same point travelled the other way.
     #[must_use]
     pub fn reversed(self) -> Self {
-        Self { tangent: -self.tangent, rates: self.rates.map(|r| -r), ..self }
+        Self { tangent: -self.tangent, rates: self.rates.map(|r| -r), sense: -self.sense, ..self }
     }
 
     /// The same curve point seen with the sides exchanged.
@@ -178,9 +180,17 @@ impl Tracer<'_> {
                 (found.at, found.p, t, a.jet1(found.at.uv), b.jet1(found.at.st), 1.0)
             }
         };
-        let tangent = if tangent.dot(along) < 0.0 { -tangent } else { tangent };
+        let against = tangent.dot(along) < 0.0;
+        let sense = if mode == Mode::Tangential {
+            0.0
+        } else if against {
+            -1.0
+        } else {
+            1.0
+        };
+        let tangent = if against { -tangent } else { tangent };
         let rates = rates(&ja, &jb, tangent)?;
-        let node = TraceNode { pa: pair[0], pb: pair[1], at, p, tangent, rates, sine };
+        let node = TraceNode { pa: pair[0], pb: pair[1], at, p, tangent, rates, sine, sense };
         // A border along the curve does not fix a point of it.
         if let Condition::Fixed(k, _) = condition
             && mode == Mode::Transversal
@@ -189,13 +199,6 @@ impl Tracer<'_> {
             return None;
         }
         Some(node)
-    }
-
-    /// The sense of a curve point: the sign of its tangent against N_A x N_B.
-    fn sense(&self, node: &TraceNode) -> f64 {
-        let ja = self.sides[0].pieces[node.pa].jet1(node.at.uv);
-        let jb = self.sides[1].pieces[node.pb].jet1(node.at.st);
-        ja.cross().cross(jb.cross()).dot(node.tangent).signum()
     }
 
     /// Follows the curve from `start` in the sense of its tangent. The points include `start`; a closed curve ends
@@ -236,13 +239,12 @@ impl Tracer<'_> {
                 }
             }
             // A step, shortened until it is good.
-            let sense = if mode == Mode::Transversal { self.sense(&current) } else { 0.0 };
             h = h.min(0.3 * self.reach(&current));
             let (middle, next) = loop {
                 if h < 1e-11 {
                     return (out, End::Unresolved("the curve cannot be followed"));
                 }
-                match self.step(mode, &current, h, sense) {
+                match self.step(mode, &current, h) {
                     Ok((middle, next, error)) => {
                         let factor = (0.5 * self.options.tol / error.max(1e-30)).powf(0.25) * 0.9;
                         let used = h;
@@ -315,7 +317,7 @@ impl Tracer<'_> {
         1.0 / node.rates.iter().fold(1e-3, |m: f64, r| m.max(r.abs()))
     }
 
-    fn step(&self, mode: Mode, from: &TraceNode, h: f64, sense: f64) -> Result<(TraceNode, TraceNode, f64), ()> {
+    fn step(&self, mode: Mode, from: &TraceNode, h: f64) -> Result<(TraceNode, TraceNode, f64), ()> {
         let pair = [from.pa, from.pb];
         let x = from.at.to_array();
         let guess = PointPair::from_array(std::array::from_fn(|k| x[k] + h * from.rates[k]));
@@ -330,13 +332,13 @@ impl Tracer<'_> {
         {
             return Err(());
         }
-        if mode == Mode::Transversal && self.sense(&next) != sense {
+        if from.sense != 0.0 && next.sense != from.sense {
             return Err(());
         }
         let guess = hermite(from, &next, 0.5);
         let plane = Condition::Plane { point: 0.5 * (from.p + next.p), direction: chord / length };
         let middle = self.locate(mode, pair, guess, plane, from.tangent).ok_or(())?;
-        if mode == Mode::Transversal && self.sense(&middle) != sense {
+        if from.sense != 0.0 && middle.sense != from.sense {
             return Err(());
         }
         let (a, b) = (&self.sides[0].pieces[pair[0]], &self.sides[1].pieces[pair[1]]);

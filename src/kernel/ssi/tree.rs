@@ -73,10 +73,11 @@ impl Node {
         let (lu, lv, area) = (au.length(), av.length(), cross.length());
         let flat = area > 1e-9 * lu * lv && area > 0.0;
         let n = if flat { cross / area } else { DVec3::ZERO };
+        // Tangential parts are squared until all were seen.
         let parts = |v: DVec3, bound: &mut [f64; 2]| {
             let h = v.dot(n);
             bound[0] = bound[0].max(h.abs());
-            bound[1] = bound[1].max((v - n * h).length());
+            bound[1] = bound[1].max(v.length_squared() - h * h);
         };
         let (mut r, mut dx, mut dy) = ([0.0; 2], [0.0; 2], [0.0; 2]);
         for j in 0..=q {
@@ -90,6 +91,9 @@ impl Node {
                     parts((at(i, j + 1) - at(i, j)) * (0.5 * q as f64) - av, &mut dy);
                 }
             }
+        }
+        for bound in [&mut r, &mut dx, &mut dy] {
+            bound[1] = bound[1].sqrt() + 1e-15 * (lu + lv);
         }
         for k in 0..2 {
             r[k] += pad;
@@ -135,11 +139,15 @@ impl Node {
         self.au.length() + self.av.length() + self.r[0] + self.r[1]
     }
 
-    /// A bound of |k . remainder|.
-    fn reach(&self, k: DVec3, bound: [f64; 2]) -> f64 {
+    /// The normal and tangential parts of a covector: their products with a remainder's bounds bound its action.
+    fn split(&self, k: DVec3) -> [f64; 2] {
         let h = k.dot(self.n);
-        h.abs() * bound[0] + (k - self.n * h).length() * bound[1]
+        [h.abs(), (k.length_squared() - h * h).max(0.0).sqrt()]
     }
+}
+
+fn reach(k: [f64; 2], bound: [f64; 2]) -> f64 {
+    k[0] * bound[0] + k[1] * bound[1]
 }
 
 /// All nodes of one side that were built so far.
@@ -255,8 +263,8 @@ pub fn judge(a: &Node, b: &Node, gap: f64) -> Verdict {
             + n.dot(a.av).abs()
             + n.dot(b.au).abs()
             + n.dot(b.av).abs()
-            + a.reach(n, a.r)
-            + b.reach(n, b.r);
+            + reach(a.split(n), a.r)
+            + reach(b.split(n), b.r);
         if d.dot(n).abs() > reach + gap {
             return Verdict::Empty;
         }
@@ -272,13 +280,11 @@ pub fn judge(a: &Node, b: &Node, gap: f64) -> Verdict {
     }
     let inverse = m.inverse();
     let k: [DVec3; 4] = columns.map(|c| inverse * c);
-    let mut contraction: f64 = 0.0;
-    let mut rho = [0.0; 4];
-    for j in 0..4 {
-        let row = a.reach(k[j], a.dx) + a.reach(k[j], a.dy) + b.reach(k[j], b.dx) + b.reach(k[j], b.dy);
-        contraction = contraction.max(row);
-        rho[j] = a.reach(k[j], a.r) + b.reach(k[j], b.r) + k[j].length() * gap;
-    }
+    let splits = k.map(|row| (a.split(row), b.split(row)));
+    let rho: [f64; 4] = std::array::from_fn(|j| {
+        let (in_a, in_b) = splits[j];
+        reach(in_a, a.r) + reach(in_b, b.r) + k[j].length() * gap
+    });
     // The null direction: signed 3 x 3 minors.
     let minor = |i: usize, j: usize, l: usize| columns[i].dot(columns[j].cross(columns[l]));
     let mut tau = [minor(1, 2, 3), -minor(0, 2, 3), minor(0, 1, 3), -minor(0, 1, 2)];
@@ -303,6 +309,10 @@ pub fn judge(a: &Node, b: &Node, gap: f64) -> Verdict {
     if range[0] > range[1] {
         return Verdict::Empty;
     }
+    let row = |(in_a, in_b): ([f64; 2], [f64; 2])| {
+        reach(in_a, a.dx) + reach(in_a, a.dy) + reach(in_b, b.dx) + reach(in_b, b.dy)
+    };
+    let contraction = splits.into_iter().map(row).fold(0.0, f64::max);
     if contraction < 0.5 { Verdict::Arc { x0, tau, range } } else { Verdict::Unknown }
 }
 
