@@ -297,3 +297,122 @@ fn bad_input_has_a_defined_answer_in_bounded_time() {
         assert!(found.result.miters.len() <= 2, "{name}: a cusp edge is no thousand miter points");
     }
 }
+
+#[test]
+fn a_patch_folded_onto_itself_is_one_region() {
+    let k = square();
+    let found = solve("fold", &interpolate(&k, &k, |u, v| turned(DVec3::new(u * u, v, 0.3 * v * v))));
+    let result = &found.result;
+    assert_eq!(result.regions.len(), 1);
+    assert!(!result.complete && result.miters.is_empty());
+    assert!(result.regions[0].max_distance < 1e-11);
+    // One half of the domain lies on the other, up to the strip beside the fold, which is a cusp edge.
+    let outer = &result.regions[0].boundary[0];
+    let area: f64 = outer.windows(2).map(|s| 0.5 * s[0].uv.perp_dot(s[1].uv)).sum();
+    assert!(area > 1.8 && area <= 2.0, "{area}");
+    for p in outer {
+        // Closest points near the fold are double roots: half of the digits.
+        assert!((p.uv.x + p.st.x).abs() < 1e-6 && (p.uv.y - p.st.y).abs() < 1e-6, "{} {}", p.uv, p.st);
+    }
+    assert_eq!(result.curves.iter().filter(|c| c.kind == CurveKind::CuspEdge).count(), 1);
+    assert!(curves(&found).is_empty());
+}
+
+#[test]
+fn cancelling_returns_what_there_is() {
+    let job = Job::new();
+    job.cancel();
+    let k = square();
+    let surface = interpolate(&k, &k, ridge(|x| x * x - 0.2));
+    let found = self_intersect(&surface, 0, &SelfIntersectOptions::default(), &job).unwrap();
+    assert!(!found.result.complete);
+}
+
+#[test]
+fn tolerances_must_be_positive() {
+    let k = square();
+    let flat = interpolate(&k, &k, |u, v| DVec3::new(u, v, 0.0));
+    for tol in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let options = SelfIntersectOptions { tol: Some(tol), ..SelfIntersectOptions::default() };
+        assert!(self_intersect(&flat, 0, &options, &Job::new()).is_err());
+    }
+}
+
+/// Where the triangle `t` is pierced by the segment `a`-`b`.
+fn pierced(t: [DVec3; 3], a: DVec3, b: DVec3) -> Option<DVec3> {
+    let (e, f, d) = (t[1] - t[0], t[2] - t[0], b - a);
+    let h = d.cross(f);
+    let det = e.dot(h);
+    if det.abs() < 1e-14 {
+        return None;
+    }
+    let s = a - t[0];
+    let u = s.dot(h) / det;
+    let q = s.cross(e);
+    let (v, w) = (d.dot(q) / det, f.dot(q) / det);
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && (0.0..=1.0).contains(&w)).then(|| a + d * w)
+}
+
+/// Points where a fine triangulation meets itself away from the diagonal: a slow oracle that shares no code with the
+/// search.
+fn brute_force(surface: &Surface, n: usize, apart: f64) -> Vec<DVec3> {
+    let at = |k: usize| -1.0 + 2.0 * k as f64 / n as f64;
+    let point = |i: usize, j: usize| surface.eval(DVec2::new(at(i), at(j)));
+    let grid: Vec<DVec3> = (0..=n).flat_map(|j| (0..=n).map(move |i| (i, j))).map(|(i, j)| point(i, j)).collect();
+    let g = |i: usize, j: usize| grid[j * (n + 1) + i];
+    let mut triangles = Vec::new();
+    for j in 0..n {
+        for i in 0..n {
+            let middle = DVec2::new(at(i) + 1.0 / n as f64, at(j) + 1.0 / n as f64);
+            triangles.push((middle, [g(i, j), g(i + 1, j), g(i + 1, j + 1)]));
+            triangles.push((middle, [g(i, j), g(i + 1, j + 1), g(i, j + 1)]));
+        }
+    }
+    let mut found = Vec::new();
+    for (k, (m, s)) in triangles.iter().enumerate() {
+        let (low, high) = (s[0].min(s[1]).min(s[2]), s[0].max(s[1]).max(s[2]));
+        for (other, t) in &triangles[k + 1..] {
+            let (l, h) = (t[0].min(t[1]).min(t[2]), t[0].max(t[1]).max(t[2]));
+            if l.cmpgt(high).any() || h.cmplt(low).any() || m.distance(*other) < apart {
+                continue;
+            }
+            for e in 0..3 {
+                found.extend(pierced(*s, t[e], t[(e + 1) % 3]));
+                found.extend(pierced(*t, s[e], s[(e + 1) % 3]));
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn a_triangulation_finds_nothing_that_is_missing() {
+    let mut state = 88_172_645_463_325_252_u64;
+    let mut random = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    };
+    let mut met = 0;
+    for trial in 0..10 {
+        let points: Vec<DVec3> = (0..16)
+            .map(|k| {
+                DVec3::new(f64::from(k % 4), f64::from(k / 4), 0.0) + DVec3::new(random(), random(), random()) * 2.2
+            })
+            .collect();
+        let surface = Surface::new(square(), square(), points, None).unwrap();
+        let found = solve(&format!("random {trial}"), &surface);
+        assert!(found.result.complete, "{trial}");
+        let n = 40;
+        // Chords of the grid are this far from the surface at most, in order of magnitude.
+        let slack = 0.02 * surface.bounds().diagonal();
+        for x in brute_force(&surface, n, 6.0 / n as f64) {
+            met += 1;
+            let near =
+                curves(&found).iter().flat_map(|c| &c.points).map(|p| p.xyz.distance(x)).fold(f64::INFINITY, f64::min);
+            assert!(near < slack, "{trial}: nothing within {near} of {x}");
+        }
+    }
+    assert!(met > 100, "the trials hardly meet themselves: {met}");
+}

@@ -23,6 +23,7 @@ mod hull;
 mod march;
 mod miter;
 mod quad;
+mod region;
 mod sheet;
 mod ternary;
 mod window;
@@ -40,7 +41,7 @@ use self::sheet::Sheet;
 use crate::kernel::geom::Surface;
 use crate::kernel::job::Job;
 use crate::kernel::ssi::result::{
-    Counts, CurveEnd, CurveKind, Intersection, IntersectionCurve, Miter, Times, Unresolved,
+    Counts, CurveEnd, CurveKind, CurvePoint, Intersection, IntersectionCurve, Miter, Region, Times, Unresolved,
 };
 use crate::kernel::tol::Tolerances;
 
@@ -62,7 +63,7 @@ pub struct SelfIntersectOptions {
 
 impl Default for SelfIntersectOptions {
     fn default() -> Self {
-        Self { tol: None, miter_radius: None, grid: 128, pair_cap: 150_000, point_cap: 200_000 }
+        Self { tol: None, miter_radius: None, grid: 128, pair_cap: 250_000, point_cap: 200_000 }
     }
 }
 
@@ -213,9 +214,26 @@ pub fn self_intersect(
         result.unresolved.push(open(pair, reason));
     }
     result.unresolved.extend(found.open.iter().map(|(pair, reason)| open(*pair, reason)));
-    let reason = "the surface coincides with itself over an area here";
-    for (pair, reason) in cover::merged(found.coincident.iter().map(|c| ([c.a, c.b], reason)).collect()) {
-        result.unresolved.push(open(pair, reason));
+    for area in region::regions(&sheet, &found.coincident) {
+        let number = result.regions.len();
+        let loops: Vec<Vec<CurvePoint>> =
+            area.loops.iter().map(|l| l.iter().map(|&pair| assembler.point(pair)).collect()).collect();
+        let distance = 2.0 * (area.distance + sheet.rounding) * sheet.scale;
+        for points in &loops {
+            result.curves.push(IntersectionCurve {
+                kind: CurveKind::CoincidentBoundary,
+                closed: true,
+                ends: [CurveEnd::Loop; 2],
+                end_ids: [None; 2],
+                error_bound: distance,
+                region: Some(number),
+                points: points.clone(),
+            });
+        }
+        result.regions.push(Region { boundary: loops, max_distance: distance });
+        if let Some(boxes) = area.boxes {
+            result.unresolved.push(open(boxes, "the outline of a coincident region is known to within one cell only"));
+        }
     }
     result.complete = result.unresolved.is_empty() && !found.capped && !job.is_cancelled();
     result.counts = Counts { leaf_pairs: found.leaf_pairs, nodes_built: found.hulls + miters.cells };

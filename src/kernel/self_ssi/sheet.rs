@@ -192,6 +192,11 @@ impl Sheet {
         let piece = &self.pieces[piece];
         let size = piece.size();
         let local = (p - piece.low) / size;
+        if self.degree == [3, 3]
+            && let Some(jet) = bicubic(&piece.points, local, size, order)
+        {
+            return jet;
+        }
         let mut bu = [[0.0; MAX_DEGREE + 1]; 3];
         let mut bv = [[0.0; MAX_DEGREE + 1]; 3];
         bernstein(self.degree[0], local.x, order, &mut bu);
@@ -263,6 +268,41 @@ impl Sheet {
     pub fn to_model(&self, x: DVec3) -> DVec3 {
         self.origin + x * self.scale
     }
+}
+
+/// The same for 4 x 4 control points, with everything on the stack.
+fn bicubic(points: &[DVec4], local: DVec2, size: DVec2, order: usize) -> Option<HomogeneousJet> {
+    let points: &[DVec4; 16] = points.try_into().ok()?;
+    let basis = |t: f64| {
+        let s = 1.0 - t;
+        let (ss, st, tt) = (s * s, s * t, t * t);
+        [
+            [ss * s, 3.0 * ss * t, 3.0 * s * tt, tt * t],
+            [-3.0 * ss, 3.0 * ss - 6.0 * st, 6.0 * st - 3.0 * tt, 3.0 * tt],
+            [6.0 * s, 6.0 * t - 12.0 * s, 6.0 * s - 12.0 * t, 6.0 * t],
+        ]
+    };
+    let (bu, bv) = (basis(local.x), basis(local.y));
+    let mut jet = HomogeneousJet::default();
+    for j in 0..4 {
+        let row = [points[4 * j], points[4 * j + 1], points[4 * j + 2], points[4 * j + 3]];
+        let sum = |b: &[f64; 4]| row[0] * b[0] + row[1] * b[1] + row[2] * b[2] + row[3] * b[3];
+        let r0 = sum(&bu[0]);
+        jet.h += r0 * bv[0][j];
+        if order > 0 {
+            let r1 = sum(&bu[1]);
+            jet.d[0] += r1 * bv[0][j];
+            jet.d[1] += r0 * bv[1][j];
+            if order > 1 {
+                jet.dd[0] += sum(&bu[2]) * bv[0][j];
+                jet.dd[1] += r1 * bv[1][j];
+                jet.dd[2] += r0 * bv[2][j];
+            }
+        }
+    }
+    jet.d = [jet.d[0] / size.x, jet.d[1] / size.y];
+    jet.dd = [jet.dd[0] / (size.x * size.x), jet.dd[1] / (size.x * size.y), jet.dd[2] / (size.y * size.y)];
+    Some(jet)
 }
 
 fn cartesian(h: &HomogeneousJet, rational: bool) -> Jet {
