@@ -84,7 +84,8 @@ fn prompt(window: &Window) -> String {
 }
 
 fn picture(window: &mut Window, name: &str) {
-    if let Some(folder) = std::env::var_os("PATCHWRIGHT_PICTURES") {
+    if let Some(folder) = std::env::var_os("PATCHWRIGHT_PICTURES").filter(|_| window.state().editor.viewport.can_draw())
+    {
         window.render().unwrap().save(Path::new(&folder).join(format!("{name}.png"))).unwrap();
     }
 }

@@ -113,7 +113,9 @@ impl App {
 
     /// Shortcuts of the active tool first, then those of the actions.
     fn keys(&mut self, ctx: &egui::Context) {
-        if self.editor.dialog.is_some() || self.editor.palette.is_some() {
+        // An open menu has the keyboard: Esc closes it and nothing else.
+        let menu = egui::Popup::is_any_open(ctx);
+        if menu || self.editor.dialog.is_some() || self.editor.palette.is_some() {
             return;
         }
         let typing = ctx.text_edit_focused();

@@ -48,7 +48,11 @@ impl Editor {
                 ui.add_space(8.0);
                 let ready = stage == Stage::Review;
                 ui.horizontal(|ui| {
-                    let text = if ready { "Heal" } else { "Next side" };
+                    let text = match (ready, session.tool.is_loop()) {
+                        (true, _) => "Heal",
+                        (false, true) => "Review",
+                        (false, false) => "Next side",
+                    };
                     if primary(ui, text).on_hover_text("Enter").clicked() {
                         asks.push(Ask::Event(Event::Key(Key::Enter)));
                     }

@@ -105,6 +105,11 @@ impl Viewport {
         }
     }
 
+    /// Whether there is a graphics adapter to draw with.
+    pub fn can_draw(&self) -> bool {
+        self.has_gpu
+    }
+
     /// The size of the picture in points.
     pub fn picture(&self) -> Picture {
         Picture::new(f64::from(self.rect.width()), f64::from(self.rect.height()))
