@@ -163,7 +163,7 @@ fn fs_field(in: Varying, @builtin(front_facing) front: bool) -> @location(0) vec
         color += 0.25 * step_color(in.field.x + slope * (f32(k) - 1.5) * 0.25);
     }
     if in.field.y < 0.999 {
-        let along = (in.position.x + in.position.y) / (7.0 * frame.pixel.z);
+        let along = (in.position.x + in.position.y) / (10.0 * frame.pixel.z);
         let hatch = smoothstep(0.20, 0.34, abs(fract(along) - 0.5));
         color = mix(scale.no_data.rgb * 0.45, scale.no_data.rgb, hatch);
     }

@@ -8,9 +8,9 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use glam::{DVec3, Vec3};
 use image::{Rgba, RgbaImage};
 use patchwright::render::{
-    CameraData, Color, ColorScale, Dash, Display, Field, FrameData, FrameStats, GlyphData, GlyphItem, GlyphShape, Gpu,
-    Hidden, Key, LineData, LineItem, LineRole, LineStyle, MeshData, MeshItem, Offscreen, Renderer, Section, Viewport,
-    srgb, to_srgb8,
+    CameraData, Color, ColorScale, Dash, Display, Emphasis, Field, FrameData, FrameStats, GlyphData, GlyphItem,
+    GlyphShape, Gpu, Hidden, Key, LineData, LineItem, LineRole, LineStyle, MeshData, MeshItem, Offscreen, Renderer,
+    Section, Viewport, srgb, to_srgb8,
 };
 
 /// One GPU for all tests of this file: software drivers compile pipelines slowly.
@@ -487,4 +487,80 @@ fn the_window_shows_the_same_colours_as_the_picture() {
     let bytes = buffer.slice(..).get_mapped_range().unwrap();
     let worst = bytes.iter().zip(expected.as_raw()).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
     assert!(worst <= 1, "{worst}");
+}
+
+#[test]
+fn emphases_strokes_and_glyphs_are_told_apart() {
+    let mut frame = FrameData { background: patchwright::render::Background::light(), ..plan_view([700, 420]) };
+    let emphases = [Emphasis::Muted, Emphasis::Normal, Emphasis::Hovered, Emphasis::Selected];
+    for (k, &emphasis) in emphases.iter().enumerate() {
+        let at = DVec3::new(-2.7 + 1.6 * k as f64, 1.2, -1.0);
+        frame.meshes.push(MeshItem { emphasis, ..item(10 + k as u64, sphere(at, 0.7), 0xb4c0cc) });
+        let arc: Vec<DVec3> = (0..=40)
+            .map(|i| f64::from(i) / 40.0 * 2.0)
+            .map(|t| at + DVec3::new(0.5 * t.cos(), 0.5 * t.sin(), 0.55))
+            .collect();
+        frame.lines.push(LineItem { emphasis, ..line(10 + k as u64, &arc, LineStyle::default()) });
+    }
+    let strokes = [Dash::Solid, Dash::LONG, Dash::SHORT, Dash::Double];
+    for (k, &dash) in strokes.iter().enumerate() {
+        let y = 0.1 - 0.25 * k as f64;
+        let wave: Vec<DVec3> = (0..=100)
+            .map(|i| f64::from(i) * 0.06)
+            .map(|x| DVec3::new(x - 3.0, y + 0.08 * (3.0 * x).sin(), 0.0))
+            .collect();
+        frame.lines.push(line(
+            20 + k as u64,
+            &wave,
+            LineStyle { width: 1.0 + 0.5 * k as f32, dash, ..LineStyle::default() },
+        ));
+    }
+    let mut glyphs = GlyphData::new(DVec3::ZERO);
+    let shapes = [
+        GlyphShape::Round,
+        GlyphShape::Ring,
+        GlyphShape::Cross,
+        GlyphShape::Diamond,
+        GlyphShape::Square,
+        GlyphShape::Triangle,
+    ];
+    let place = |k: usize| DVec3::new(-3.0 + k as f64, -1.2, 0.0);
+    let ink = srgb(0x1f5fa8);
+    for (k, &shape) in shapes.iter().enumerate() {
+        glyphs.push(place(k), shape, 18.0, ink);
+        glyphs.push(place(k) - DVec3::Y * 0.45, shape, 9.0, srgb(0xf07f13));
+    }
+    glyphs.push_arrow(place(6), DVec3::new(1.0, 1.0, 0.0), 18.0, ink);
+    glyphs.push_arrow(place(6) - DVec3::Y * 0.45, DVec3::X, 12.0, srgb(0xf07f13));
+    frame.glyphs.push(GlyphItem {
+        key: Key::new(30, 0),
+        revision: fresh(),
+        glyphs: Arc::new(glyphs),
+        hidden: Hidden::OnTop,
+        sectioned: false,
+    });
+    let Some(picture) = render("styles", &frame) else { return };
+    let pixel = |at: DVec3| {
+        let (x, y) = (350.0 + 100.0 * at.x, 210.0 - 100.0 * at.y);
+        picture.get_pixel(x as u32, y as u32).0
+    };
+    let crop = |at: DVec3| -> Vec<u8> {
+        let (x, y) = ((350.0 + 100.0 * at.x) as u32, (210.0 - 100.0 * at.y) as u32);
+        (0..24)
+            .flat_map(|j| (0..24).map(move |i| (i, j)))
+            .map(|(i, j)| picture.get_pixel(x + i - 12, y + j - 12).0[0])
+            .collect()
+    };
+    for a in 0..7 {
+        for b in 0..a {
+            let differ = crop(place(a)).iter().zip(&crop(place(b))).filter(|(p, q)| p.abs_diff(**q) > 60).count();
+            assert!(differ > 25, "glyphs {a} and {b} differ in {differ} pixels");
+        }
+    }
+    let sphere = |k: usize| pixel(DVec3::new(-2.7 + 1.6 * k as f64, 1.1, 0.0));
+    let warmth = |p: [u8; 4]| i32::from(p[0]) - i32::from(p[2]);
+    let luma = |p: [u8; 4]| p[..3].iter().map(|&c| i32::from(c)).sum::<i32>();
+    assert!(luma(sphere(0)) > luma(sphere(1)) + 15, "muted is paler on a pale ground");
+    assert!(luma(sphere(2)) > luma(sphere(1)) + 15, "hovered is brighter");
+    assert!(warmth(sphere(3)) > warmth(sphere(1)) + 40, "selected takes the accent");
 }

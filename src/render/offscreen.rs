@@ -52,10 +52,22 @@ impl Offscreen {
         self.viewport.stats()
     }
 
+    /// The CPU's share of a frame; the commands are for [`Gpu::queue`]. `None` when the picture is already there.
+    pub fn encode(&mut self, frame: &Arc<FrameData>) -> Option<wgpu::CommandBuffer> {
+        self.viewport.prepare(&self.gpu.device, &self.gpu.queue, frame)
+    }
+
     /// Renders without reading back: submits the frame and returns at once.
     pub fn submit(&mut self, frame: &Arc<FrameData>) {
-        let commands = self.viewport.prepare(&self.gpu.device, &self.gpu.queue, frame);
+        let commands = self.encode(frame);
         self.gpu.queue.submit(commands);
+    }
+
+    /// Waits until everything submitted is drawn.
+    pub fn wait(&self) {
+        if let Err(e) = self.gpu.device.poll(wgpu::PollType::wait_indefinitely()) {
+            log::warn!("waiting for the GPU: {e}");
+        }
     }
 
     /// Renders a frame at its own size.

@@ -14,7 +14,6 @@ use super::frame::{
     MeshItem, Section,
 };
 use super::theme::Theme;
-use crate::kernel::geom::Aabb;
 use crate::model::document::EntityId;
 use crate::view::display::{CurveRef, Display as Shown};
 use crate::view::scene::{Item, ItemKind, Scene};
@@ -208,9 +207,7 @@ fn color_of(item: &Item, at: usize, look: &Look) -> Color {
 }
 
 fn dress(revision: u64, shown: &Shown) -> Dressed {
-    let bounds = shown.curves.iter().flat_map(|c| &c.points).chain(&shown.mesh.points).copied();
-    let bounds = Aabb::of(bounds);
-    let origin = if bounds.is_empty() { DVec3::ZERO } else { bounds.center() };
+    let origin = if shown.bounds.is_empty() { DVec3::ZERO } else { shown.bounds.center() };
     let local = |p: &DVec3| (*p - origin).as_vec3().to_array();
     let mesh = (!shown.mesh.triangles.is_empty()).then(|| {
         Arc::new(MeshData {
@@ -241,6 +238,7 @@ fn cap_line(plane: &SectionPlane, shown: &Shown, item: &Item) -> LineData {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::kernel::geom::Aabb;
     use crate::view::camera::{Axis, Camera, Projection};
     use crate::view::viewport::Viewport;
 

@@ -163,6 +163,8 @@ pub struct Display {
     pub curves: Vec<DisplayCurve>,
     /// The tree over the segments of `curves`.
     pub segments: SegmentTree,
+    /// A box around triangles and lines.
+    pub bounds: Aabb,
     /// Whether a cap made it coarser than `chord_tol`.
     pub capped: bool,
 }
@@ -182,6 +184,7 @@ impl Display {
                 (SurfaceMesh::default(), vec![DisplayCurve { curve: CurveRef::Free(id), points, t }], capped)
             }
         };
+        let bounds = Aabb::of(curves.iter().flat_map(|c| &c.points).chain(&mesh.points).copied());
         let tree = TriTree::new(mesh.points.clone(), &mesh.triangles);
         let segments = curves
             .iter()
@@ -194,7 +197,7 @@ impl Display {
                 })
             })
             .collect();
-        Self { chord_tol, mesh, tree, curves, segments: SegmentTree::new(segments), capped }
+        Self { chord_tol, mesh, tree, curves, segments: SegmentTree::new(segments), bounds, capped }
     }
 
     /// The number of triangles.

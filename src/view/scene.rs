@@ -165,10 +165,8 @@ impl Scene {
     /// A box around the items for which `which` is true. Displays give a tight one, control points a wide one.
     pub fn bounds_of(&self, which: impl Fn(&Item) -> bool) -> Aabb {
         self.items.iter().filter(|item| which(item)).fold(Aabb::EMPTY, |all, item| {
-            let tight = item.display.as_ref().map(|d| {
-                d.curves.iter().flat_map(|c| &c.points).chain(&d.mesh.points).fold(Aabb::EMPTY, |b, &p| b.with(p))
-            });
-            all.union(&tight.filter(|b| !b.is_empty()).unwrap_or(item.bounds))
+            let tight = item.display.as_ref().map(|d| d.bounds).filter(|b| !b.is_empty());
+            all.union(&tight.unwrap_or(item.bounds))
         })
     }
 

@@ -1,0 +1,151 @@
+//! The CPU's share of one frame in a scene of a million triangles and a hundred thousand line segments: dressing the
+//! scene, culling, uniforms and command encoding (phases: medians of wall time; "CPU": mean of this thread's time), against
+//! 4 ms for all of it and the panels. On a real GPU the time
+//! until the picture is there is shown as well.
+
+#![allow(clippy::unwrap_used, missing_docs, reason = "a benchmark may stop at a broken scene")]
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use glam::{DVec2, DVec3};
+use patchwright::kernel::geom::{Knots, Surface};
+use patchwright::model::document::{Document, Shape, Unit};
+use patchwright::render::{Display, Emphasis, Gpu, Look, Offscreen, Stage};
+use patchwright::view::camera::{Axis, Camera};
+use patchwright::view::scene::{Request, Scene};
+use patchwright::view::viewport::{View, Viewport};
+
+/// Hills of `n` x `n` wavy patches with 12 x 12 spans.
+fn hills(n: usize) -> Document {
+    let mut document = Document::new(Unit::Metre);
+    let breaks: Vec<f64> = (0..=12).map(f64::from).collect();
+    let knots = Knots::clamped(3, &breaks, 1).unwrap();
+    let count = knots.control_count();
+    let step = 10.0 / n as f64;
+    for b in 0..n {
+        for a in 0..n {
+            let height = |k: usize| {
+                let (i, j) = ((k % count) as f64 / (count - 1) as f64, (k / count) as f64 / (count - 1) as f64);
+                let (x, y) = ((a as f64 + i) * step, (b as f64 + j) * step);
+                DVec3::new(x, y, 0.2 * (3.0 * x).sin() * (2.0 * y).cos() + 0.05 * (17.0 * x + 11.0 * y).sin())
+            };
+            let points = (0..count * count).map(height).collect();
+            let surface = Surface::new(knots.clone(), knots.clone(), points, None).unwrap();
+            document.add(format!("{a} {b}"), Shape::Surface(Arc::new(surface)), None);
+        }
+    }
+    document
+}
+
+/// A scene of at least a million triangles.
+fn scene(n: usize) -> Scene {
+    let document = hills(n);
+    let mut chord_tol = 1e-2;
+    loop {
+        let mut scene = Scene::default();
+        scene.sync(&document);
+        for item in scene.items().to_vec() {
+            scene.accept(Request { id: item.id(), geometry: item.geometry.clone(), chord_tol }.run());
+        }
+        if scene.counts().0 >= 1_000_000 {
+            return scene;
+        }
+        chord_tol /= 1.2;
+    }
+}
+
+/// Frames measured.
+const ROUNDS: u32 = 200;
+
+/// CPU time of this thread: what other programs do meanwhile does not count. Coarse, so it is read around many frames.
+/// Wall time where the system does not say.
+fn cpu() -> Duration {
+    static START: std::sync::OnceLock<Instant> = std::sync::OnceLock::new();
+    let scheduled = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let nanos = scheduled.and_then(|text| text.split(' ').next()?.parse().ok());
+    nanos.map_or_else(|| START.get_or_init(Instant::now).elapsed(), Duration::from_nanos)
+}
+
+fn median(times: &mut [Duration]) -> f64 {
+    times.sort();
+    times[times.len() / 2].as_secs_f64() * 1e3
+}
+
+fn main() {
+    let gpu = match Gpu::headless() {
+        Ok(gpu) => gpu,
+        Err(e) => return println!("skipped: {e}"),
+    };
+    println!("{}", gpu.name);
+    println!(
+        "{:>9} {:>10} {:>9} {:>7}  {:>9} {:>9} {:>9} {:>9}  {}",
+        "surfaces",
+        "triangles",
+        "segments",
+        "draws",
+        "dress ms",
+        "encode ms",
+        "submit ms",
+        "CPU ms",
+        "target 4 ms in all"
+    );
+    let screen = Viewport::new(1920.0, 1080.0);
+    let mut offscreen = Offscreen::new(gpu);
+    for (n, close) in [(10, false), (10, true), (30, false)] {
+        let scene = scene(n);
+        let mut camera = Camera::default();
+        camera.look_along(Axis::Oblique);
+        camera.frame(&scene.bounds(), screen);
+        if close {
+            camera.distance *= 0.3;
+        }
+        let look = Look { display: Display { isolines: true, ..Display::default() }, ..Look::default() };
+        let mut stage = Stage::default();
+        let mut frame = |camera: &mut Camera| {
+            // The camera moves every frame, as it does under the hand.
+            camera.orbit(camera.target, DVec2::new(3.0, 0.4), screen);
+            let view = View::new(camera, screen, &scene.bounds());
+            Arc::new(stage.frame(&scene, &view, &look, |_| Emphasis::Normal))
+        };
+        // The first frames build buffers.
+        let software = offscreen.gpu().software;
+        let mut picture = Vec::new();
+        for _ in 0..if software { 2 } else { 40 } {
+            let begun = Instant::now();
+            offscreen.submit(&frame(&mut camera));
+            offscreen.wait();
+            picture.push(begun.elapsed());
+        }
+        let (mut dress, mut encode) = (Vec::new(), Vec::new());
+        let before = cpu();
+        for _ in 0..ROUNDS {
+            let start = Instant::now();
+            let frame = frame(&mut camera);
+            dress.push(start.elapsed());
+            let start = Instant::now();
+            // Thrown away: a software adapter would draw it on the same cores.
+            drop(offscreen.encode(&frame));
+            encode.push(start.elapsed());
+        }
+        let all = (cpu() - before).as_secs_f64() * 1e3 / f64::from(ROUNDS);
+        let start = Instant::now();
+        let commands = offscreen.encode(&frame(&mut camera));
+        let encoded = start.elapsed();
+        offscreen.gpu().queue.submit(commands);
+        let submit = (start.elapsed() - encoded).as_secs_f64() * 1e3;
+        offscreen.wait();
+        let (triangles, segments) = scene.counts();
+        println!(
+            "{:>9} {triangles:>10} {segments:>9} {:>7}  {:>9.3} {:>9.3} {submit:>9.3} {all:>9.3}  {}",
+            n * n,
+            offscreen.stats().draws,
+            median(&mut dress),
+            median(&mut encode),
+            if all + submit < 4.0 { "met" } else { "missed" }
+        );
+        if !software {
+            println!("          until the picture is there: {:.3} ms", median(&mut picture));
+        }
+    }
+}
