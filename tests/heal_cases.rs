@@ -1,5 +1,7 @@
 //! Healing as a whole: sets of patches, bad input, cancelling, thread counts, and a real broken model.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test stops at what it did not expect")]
+
 use std::path::Path;
 use std::sync::Arc;
 

@@ -1,6 +1,8 @@
 //! The bundled examples through the real program: healed to 1e-3 of the diagonal with at least 80 % of the samples
 //! projected, and written as IGES that reads as C1.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test stops at what it did not expect")]
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

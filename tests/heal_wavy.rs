@@ -1,6 +1,8 @@
 //! `heal_wavy` of the shared data: four pieces of a wavy surface around a missing rectangle; surface 4 is the
 //! whole parent, the truth.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test stops at what it did not expect")]
+
 use std::path::PathBuf;
 use std::sync::Arc;
 

@@ -197,7 +197,7 @@ mod tests {
     #[test]
     fn it_interpolates_its_data() {
         let data: Vec<(DVec2, f64)> = (0..8)
-            .map(|k| f64::from(k))
+            .map(f64::from)
             .map(|k| (DVec2::new((k * 0.7).sin(), (k * 1.3).cos()), 0.5 + 0.3 * (k * 2.1).sin()))
             .collect();
         for &(p, t) in &data {
@@ -228,7 +228,7 @@ mod tests {
 
     #[test]
     fn one_row_works_for_edges() {
-        let known = Grid::from_fn(10, 0, |i, _| (i < 3 || i > 6).then(|| 0.1 * i as f64));
+        let known = Grid::from_fn(10, 0, |i, _| (!(3..=6).contains(&i)).then_some(0.1 * i as f64));
         let full = fill(&known, &HardyOptions::default(), &Job::new());
         for i in 0..=10 {
             assert!((full[(i, 0)].unwrap() - 0.1 * i as f64).abs() < 1e-6);

@@ -292,7 +292,7 @@ mod tests {
         for count in [3, 9] {
             let mut curves: Vec<Curve> =
                 (0..count)
-                    .map(|k| f64::from(k))
+                    .map(f64::from)
                     .map(|k| {
                         if (k as i32) % 2 == 0 {
                             line((k, 0.0), (k + 1.0, 0.0))
