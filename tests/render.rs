@@ -2,6 +2,7 @@
 //!
 //! Without a Vulkan adapter every test reports itself as skipped; with `PATCHWRIGHT_REQUIRE_GPU=1` that is a failure.
 #![cfg(feature = "editor")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test may stop where its helpers fail")]
 
 use std::sync::{Arc, Mutex, MutexGuard};
 

@@ -91,7 +91,7 @@ impl Plan {
             let push = |plan: &mut Self, layer: usize, alpha: f32| {
                 let uniform =
                     plan.item(mv, [1.0, 1.0, 1.0, alpha], [0.0; 4], [cut, 0.0, 0.0, 0.0], [0.0, 0.0, PULL, 0.0]);
-                plan.glyphs[layer].push(Batch { item: at, uniform, runs: vec![0..gpu.count] });
+                plan.glyphs[layer].push(Batch { item: at, uniform, runs: std::iter::once(0..gpu.count).collect() });
             };
             match item.hidden {
                 Hidden::OnTop => push(&mut plan, ON_TOP, 1.0),
