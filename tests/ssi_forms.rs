@@ -181,3 +181,100 @@ fn degenerate_and_distant_surfaces_give_an_answer() {
     assert!(matches!(with(1e3), Err(SsiError::TooLarge { .. })));
     assert!(matches!(intersect(&[], &[(1, &far)], &SsiOptions::default(), &Job::new()), Err(SsiError::Empty { .. })));
 }
+
+/// The numbers of open and closed zero contours of a function over [-1, 1]^2 by marching squares: slow and plain.
+fn contours(f: &impl Fn(f64, f64) -> f64, n: usize) -> (usize, usize) {
+    let at = |k: usize| -1.0 + 2.0 * k as f64 / n as f64;
+    let sign: Vec<bool> =
+        (0..=n).flat_map(|j| (0..=n).map(move |i| (i, j))).map(|(i, j)| f(at(i), at(j)) > 0.0).collect();
+    let s = |i: usize, j: usize| sign[j * (n + 1) + i];
+    // Crossed grid edges are nodes, cells link them: along u first, then along v.
+    let edges = 2 * (n + 1) * (n + 1);
+    let along_u = |i: usize, j: usize| j * (n + 1) + i;
+    let along_v = |i: usize, j: usize| (n + 1) * (n + 1) + j * (n + 1) + i;
+    let mut links: Vec<Vec<usize>> = vec![Vec::new(); edges];
+    for j in 0..n {
+        for i in 0..n {
+            let mut crossed = Vec::new();
+            for (a, b, e) in [
+                (s(i, j), s(i + 1, j), along_u(i, j)),
+                (s(i + 1, j), s(i + 1, j + 1), along_v(i + 1, j)),
+                (s(i + 1, j + 1), s(i, j + 1), along_u(i, j + 1)),
+                (s(i, j + 1), s(i, j), along_v(i, j)),
+            ] {
+                if a != b {
+                    crossed.push(e);
+                }
+            }
+            if crossed.len() == 4 && (f(0.5 * (at(i) + at(i + 1)), 0.5 * (at(j) + at(j + 1))) > 0.0) == s(i, j) {
+                crossed.rotate_left(1);
+            }
+            for pair in crossed.chunks(2) {
+                links[pair[0]].push(pair[1]);
+                links[pair[1]].push(pair[0]);
+            }
+        }
+    }
+    let mut seen = vec![false; edges];
+    let (mut open, mut closed) = (0, 0);
+    for start in 0..edges {
+        if seen[start] || links[start].is_empty() {
+            continue;
+        }
+        let (mut stack, mut ends) = (vec![start], 0);
+        seen[start] = true;
+        while let Some(e) = stack.pop() {
+            ends += usize::from(links[e].len() == 1);
+            for &next in &links[e] {
+                if !seen[next] {
+                    seen[next] = true;
+                    stack.push(next);
+                }
+            }
+        }
+        if ends == 0 { closed += 1 } else { open += 1 }
+    }
+    (open, closed)
+}
+
+/// Random pairs of graphs against marching squares on their difference. Pairs on which two grids disagree have
+/// details finer than the grid and say nothing about us.
+fn random_graphs(count: usize) {
+    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 33) as f64 / f64::from(1_u32 << 31)) * 2.0 - 1.0
+    };
+    let mut judged = 0;
+    for k in 0..count {
+        let mut coefficients = || -> Vec<f64> { (0..16).map(|_| 0.5 * random()).collect() };
+        let (p, q) = (coefficients(), coefficients());
+        let value = |c: &[f64], x: f64, y: f64| {
+            (0..16).map(|m| c[m] * x.powi((m % 4) as i32) * y.powi((m / 4) as i32)).sum::<f64>()
+        };
+        let difference = |x: f64, y: f64| value(&p, x, y) - value(&q, x, y);
+        let counts = contours(&difference, 256);
+        if counts != contours(&difference, 151) {
+            continue;
+        }
+        judged += 1;
+        let (a, b) = (graph(3, |x, y| value(&p, x, y)), graph(3, |x, y| value(&q, x, y)));
+        let options = SsiOptions { tol: Some(1e-4), ..Default::default() };
+        let result = intersect(&[(0, &a)], &[(1, &b)], &options, &Job::new()).unwrap();
+        let closed = result.curves.iter().filter(|c| c.closed).count();
+        assert!(result.complete, "pair {k}: {:?}", result.unresolved.first());
+        assert_eq!((result.curves.len() - closed, closed), counts, "pair {k}");
+    }
+    assert!(2 * judged > count);
+}
+
+#[test]
+fn random_pairs_have_the_curves_that_a_dense_grid_sees() {
+    random_graphs(40);
+}
+
+#[test]
+#[ignore = "the long run of the same"]
+fn many_random_pairs_have_the_curves_that_a_dense_grid_sees() {
+    random_graphs(2000);
+}

@@ -313,7 +313,7 @@ pub fn judge(a: &Node, b: &Node, gap: f64) -> Verdict {
         reach(in_a, a.dx) + reach(in_a, a.dy) + reach(in_b, b.dx) + reach(in_b, b.dy)
     };
     let contraction = splits.into_iter().map(row).fold(0.0, f64::max);
-    if contraction < 0.5 { Verdict::Arc { x0, tau, range } } else { Verdict::Unknown }
+    if contraction < 0.8 { Verdict::Arc { x0, tau, range } } else { Verdict::Unknown }
 }
 
 /// A polynomial net over a rectangle of a rational piece, and the error measured between the nodes.
