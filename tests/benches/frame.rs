@@ -80,15 +80,7 @@ fn main() {
     println!("{}", gpu.name);
     println!(
         "{:>9} {:>10} {:>9} {:>7}  {:>9} {:>9} {:>9} {:>9}  target 4 ms in all",
-        "surfaces",
-        "triangles",
-        "segments",
-        "draws",
-        "dress ms",
-        "encode ms",
-        "submit ms",
-        "CPU ms",
-        "target 4 ms in all"
+        "surfaces", "triangles", "segments", "draws", "dress ms", "encode ms", "submit ms", "CPU ms"
     );
     let screen = Viewport::new(1920.0, 1080.0);
     let mut offscreen = Offscreen::new(gpu);
