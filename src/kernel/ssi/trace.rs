@@ -280,6 +280,24 @@ impl Tracer<'_> {
                     continue;
                 }
             };
+            // A curve that bends outwards on the border itself makes no way: it leaves here.
+            if leaving && ends[0].p.distance(current.p) < 1e-10 {
+                let x = next.at.to_array();
+                let beyond = |k: &usize| (x[*k] - 1.0).max(-x[*k]);
+                let k = (0..4).max_by(|i, j| beyond(i).total_cmp(&beyond(j))).unwrap_or(0);
+                hops += 1;
+                if hops > 12 {
+                    return (out, End::Unresolved("the curve runs to and fro across a border"));
+                }
+                match self.cross(mode, &current, k) {
+                    Some(beyond) => {
+                        current = beyond;
+                        out.push(beyond);
+                        continue;
+                    }
+                    None => return (out, End::Boundary),
+                }
+            }
             for node in ends {
                 if let Some(disc) = self.enters(&current, &node, travelled) {
                     return (out, End::Junction(disc));
@@ -553,8 +571,19 @@ impl Tracer<'_> {
         }
         let at = hermite(from, to, f);
         // Near tangency a corrected point is only good to rounding over the sine of the angle.
-        let slack = (1e-3 * length + 1e-9 + 2.0 * self.options.floor / target.sine).max(least);
-        let slack = if least > 0.0 { least + 2.0 * self.options.floor / target.sine } else { slack };
-        a.point(at.uv).distance(target.p) < slack && b.point(at.st).distance(target.p) < slack
+        let noise = 2.0 * self.options.floor / target.sine;
+        let within = |d: f64| a.point(at.uv).distance(target.p) < d && b.point(at.st).distance(target.p) < d;
+        if least > 0.0 {
+            return within(least + noise);
+        }
+        if target.sense == 0.0 || within(1e-9 + noise) {
+            return within(1e-3 * length + 1e-9 + noise);
+        }
+        // The interpolant is only as good as the tolerance: what it leads to decides.
+        let plane = Condition::Plane { point: target.p, direction: target.tangent };
+        within(0.1 * length + 1e-9 + noise)
+            && self
+                .locate(Mode::Transversal, [from.pa, from.pb], at, plane, target.tangent)
+                .is_some_and(|node| node.p.distance(target.p) < 1e-8 + 1e-5 * length + noise)
     }
 }
