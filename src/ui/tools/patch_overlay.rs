@@ -136,6 +136,7 @@ impl PatchSession {
         let mut d = Drawing { overlay, origin: bounds.filter(|p| p.is_finite()).unwrap_or_default(), part: 0 };
         let picking = matches!(self.tool.stage(), Stage::Side(_));
         d.overlay.iso_lines = picking;
+        d.overlay.ghost = self.tool.stage() == Stage::Result;
         self.preview_surface(&mut d, t);
         self.result_surface(&mut d, t);
         for (_, points) in self.tool.reusable() {

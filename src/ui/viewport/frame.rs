@@ -12,6 +12,9 @@ use crate::view::camera::Camera;
 use crate::view::section::SectionPlane;
 use crate::view::viewport::View;
 
+/// How much of the model shows while something lies on it.
+const GHOST: f32 = 0.16;
+
 /// What a tool adds to the picture.
 #[derive(Clone, Debug, Default)]
 pub struct Overlay {
@@ -21,6 +24,8 @@ pub struct Overlay {
     pub mute: bool,
     /// Shows the iso-lines, because they can be picked.
     pub iso_lines: bool,
+    /// Draws the model as a faint ghost, so that it does not flicker through what lies on it.
+    pub ghost: bool,
     /// Replaces the colours of entities.
     pub fields: Vec<(EntityId, render::Field)>,
     /// Meshes.
@@ -107,6 +112,9 @@ impl Viewport {
             line.emphasis = Emphasis::Normal;
         }
         for item in &mut frame.meshes {
+            if overlay.ghost {
+                item.color[3] = GHOST;
+            }
             item.field = overlay.fields.iter().find(|(of, _)| of.0 == item.key.entity).map(|(_, field)| field.clone());
         }
         frame.meshes.extend(overlay.meshes.iter().cloned());
