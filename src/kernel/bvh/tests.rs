@@ -145,3 +145,269 @@ fn lazy_full_plain_and_wide_builds_agree_to_the_byte() {
         }
     }
 }
+
+/// A quarter turn about the z axis of a quadratic profile (radius, height, weight).
+fn revolved(profile: [(f64, f64, f64); 3]) -> Surface {
+    let w = std::f64::consts::FRAC_1_SQRT_2;
+    let (mut points, mut weights) = (Vec::new(), Vec::new());
+    for (radius, height, wp) in profile {
+        for (x, y, wq) in [(1.0, 0.0, 1.0), (1.0, 1.0, w), (0.0, 1.0, 1.0)] {
+            points.push(DVec3::new(radius * x, radius * y, height));
+            weights.push(wp * wq);
+        }
+    }
+    let k = || Knots::bezier(2, 0.0, 1.0).unwrap();
+    Surface::new(k(), k(), points, Some(weights)).unwrap()
+}
+
+#[test]
+fn spheres_and_cylinders_are_their_own_osculating_tori() {
+    let w = std::f64::consts::FRAC_1_SQRT_2;
+    let sphere = revolved([(2.0, 0.0, 1.0), (2.0, 2.0, w), (0.0, 2.0, 1.0)]);
+    let cylinder = revolved([(2.0, 0.0, 1.0), (2.0, 1.5, 1.0), (2.0, 3.0, 1.0)]);
+    for surface in [sphere, cylinder] {
+        let tree = SurfaceTree::new(&surface, &BvhOptions { height: 3, ..BvhOptions::default() }).unwrap();
+        for leaf in tree.level(3) {
+            let torus = tree.torus(leaf).unwrap();
+            assert!(torus.k.iter().all(|k| k.abs() < 1e-6 || (k.abs() - 0.5).abs() < 1e-6), "{torus:?}");
+            // The stored bound is of fourth order, the truth is the rounding of f32.
+            let [low, high] = tree.rectangle(leaf);
+            for uv in [low, 0.5 * (low + high), high] {
+                assert!(torus.distance(surface.eval(uv)).abs() < 1e-6);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_deviation_falls_as_the_cube_of_the_size() {
+    let mut random = Random(11);
+    for kind in [kinds()[0], kinds()[6], kinds()[14]] {
+        let surface = random_surface(kind, &mut random);
+        let tree = SurfaceTree::new(&surface, &BvhOptions { height: 7, ..BvhOptions::default() }).unwrap();
+        let mean = |level: u32| {
+            let nodes = tree.level(level);
+            let sum: f64 = nodes.iter().map(|&id| tree.torus(id).unwrap().deviation.ln()).sum();
+            (sum / nodes.len() as f64).exp()
+        };
+        let (coarse, fine) = (mean(5), mean(7));
+        assert!((40.0..110.0).contains(&(coarse / fine)), "{kind:?}: {coarse} / {fine}");
+    }
+}
+
+#[test]
+fn the_hausdorff_bound_holds_both_ways() {
+    let mut random = Random(12);
+    for kind in kinds() {
+        let surface = random_surface(kind, &mut random);
+        let tree = SurfaceTree::new(&surface, &BvhOptions { height: 5, ..BvhOptions::default() }).unwrap();
+        for level in [3, 5] {
+            for uv in samples(&surface, 12, &mut random) {
+                let id = tree.node_over(level, uv);
+                let bound = tree.patches()[id.patch as usize].hausdorff(id.index).unwrap();
+                let torus = tree.torus(id).unwrap();
+                let [low, high] = tree.rectangle(id);
+                for (s, t) in [(0.0, 0.3), (1.0, 1.0), (random.next(), random.next())] {
+                    let local = DVec2::new(s, t);
+                    // The same parameters on both: that bounds either one-sided distance.
+                    let gap = surface.eval(low + (high - low) * local).distance(torus.eval(torus.matched(local)));
+                    let rounding = 1e-14 * surface.bounds().max_abs();
+                    assert!(gap <= bound + rounding, "{kind:?} level {level}: {gap} > {bound}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_toroidal_cover_reaches_its_tolerance_or_says_where_not() {
+    let surface = random_surface(kinds()[0], &mut Random(13));
+    let tree = SurfaceTree::new(&surface, &BvhOptions { height: 8, ..BvhOptions::default() }).unwrap();
+    let cover = tree.toroidal_cover(1e-3, &Job::new());
+    assert!(cover.complete && cover.missed.is_empty() && cover.largest <= 1e-3);
+    let area = |id: &NodeId| 1.0 / f64::from(1_u32 << id.depth());
+    assert_eq!(cover.tori.iter().map(area).sum::<f64>(), 1.0);
+    let coarse = SurfaceTree::new(&surface, &BvhOptions { height: 1, ..BvhOptions::default() }).unwrap();
+    let cover = coarse.toroidal_cover(1e-9, &Job::new());
+    assert_eq!((cover.tori.len(), cover.missed.len()), (0, 4));
+    let stopped = Job::new();
+    stopped.cancel();
+    assert!(!tree.toroidal_cover(1e-3, &stopped).complete);
+}
+
+/// Two wavy graphs that cross.
+fn crossing() -> [Surface; 2] {
+    let mut random = Random(21);
+    let kind = Kind { degree: [3, 3], spans: [3, 2], ..Kind::default() };
+    [random_surface(kind, &mut random), random_surface(kind, &mut random)]
+}
+
+#[test]
+fn the_traversal_finds_every_overlapping_leaf_pair() {
+    let [a, b] = crossing();
+    let options = BvhOptions { height: 2, ..BvhOptions::default() };
+    let (ta, tb) = (SurfaceTree::new(&a, &options).unwrap(), SurfaceTree::new(&b, &options).unwrap());
+    let margin = 0.01;
+    let traverse_options = TraverseOptions { margin, ..TraverseOptions::default() };
+    let found = traverse(&ta, &tb, &traverse_options, |_| Verdict::Descend, &Job::new());
+    assert!(found.complete && found.leaf_pairs == found.pairs.len());
+    let set: std::collections::HashSet<Pair> = found.pairs.iter().copied().collect();
+    assert_eq!(set.len(), found.pairs.len());
+    // Volumes of children may stick out of their parent's, so the oracle is the surfaces themselves.
+    let points = |surface: &Surface, tree: &SurfaceTree, id: NodeId| -> Vec<DVec3> {
+        let [low, high] = tree.rectangle(id);
+        let at = |k: u32| DVec2::new(f64::from(k % 4) / 3.0, f64::from(k / 4) / 3.0);
+        (0..16).map(|k| surface.eval(low + (high - low) * at(k))).collect()
+    };
+    let of_b: Vec<(NodeId, Vec<DVec3>)> = tb.level(2).into_iter().map(|id| (id, points(&b, &tb, id))).collect();
+    let mut near = 0;
+    for x in ta.level(2) {
+        let of_a = points(&a, &ta, x);
+        for (y, of_b) in &of_b {
+            if of_a.iter().any(|p| of_b.iter().any(|q| p.distance(*q) <= margin)) {
+                near += 1;
+                assert!(set.contains(&Pair { a: x, b: *y }), "{x:?} {y:?}");
+            }
+        }
+    }
+    assert!(near >= 10, "{near}");
+    // What is reported does overlap, but for the corners that the quick test does not see.
+    let overlap = |pair: &&Pair| {
+        let place = |tree: &SurfaceTree, id| {
+            let mut r = tree.node(id).rectangle();
+            r.center += tree.origin(id);
+            (r, tree.node(id).radius())
+        };
+        let ((p, rp), (q, rq)) = (place(&ta, pair.a), place(&tb, pair.b));
+        p.distance(&q) <= rp + rq + margin * 1.001
+    };
+    let tight = found.pairs.iter().filter(overlap).count();
+    assert!(10 * tight > 8 * found.pairs.len(), "{tight} of {}", found.pairs.len());
+}
+
+#[test]
+fn neither_threads_nor_laziness_change_a_traversal() {
+    let [a, b] = crossing();
+    let run = |threads: usize, full: bool, parallel: bool| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| {
+            let tree = |s| SurfaceTree::new(s, &BvhOptions { height: 4, ..BvhOptions::default() }).unwrap();
+            let (ta, tb) = (tree(&a), tree(&b));
+            if full {
+                assert!(ta.build_all(true, &Job::new()).unwrap() && tb.build_all(true, &Job::new()).unwrap());
+            }
+            let options = TraverseOptions { parallel, ..TraverseOptions::default() };
+            let found = traverse(&ta, &tb, &options, |pair| early_exit(&ta, &tb, pair), &Job::new());
+            let bytes: Vec<String> =
+                found.pairs.iter().map(|p| format!("{:?}{:?}", ta.node(p.a), tb.node(p.b))).collect();
+            (found, bytes)
+        })
+    };
+    let plain = run(1, true, false);
+    assert!(plain.0.pairs.len() > 20 && plain.0.leaf_pairs < plain.0.pairs.len());
+    assert_eq!(plain, run(2, true, true));
+    assert_eq!(plain, run(2, false, true));
+    assert_eq!(plain, run(1, false, false));
+}
+
+#[test]
+fn a_cancelled_traversal_says_so() {
+    let [a, b] = crossing();
+    let tree = |s| SurfaceTree::new(s, &BvhOptions { height: 6, ..BvhOptions::default() }).unwrap();
+    let (ta, tb) = (tree(&a), tree(&b));
+    let job = Job::new();
+    job.cancel();
+    let options = TraverseOptions { margin: 0.1, ..TraverseOptions::default() };
+    assert!(!traverse(&ta, &tb, &options, |_| Verdict::Descend, &job).complete);
+    assert!(!ta.build_all(false, &job).unwrap());
+}
+
+#[test]
+fn boxes_and_hulls_never_miss_and_hulls_are_tightest() {
+    let [a, b] = crossing();
+    let options = BvhOptions { height: 3, ..BvhOptions::default() };
+    let count = |kind| {
+        let tree = |s| VolumeTree::build(s, &options, kind, &Job::new()).unwrap();
+        tree(&a).overlap(&tree(&b), None, 0.0, &Job::new())
+    };
+    let (boxes, hulls) = (count(VolumeKind::Aabb), count(VolumeKind::Hull));
+    let boxes_set: std::collections::HashSet<Pair> = boxes.pairs.iter().copied().collect();
+    assert!(hulls.pairs.len() < boxes.pairs.len());
+    assert!(hulls.pairs.iter().all(|p| boxes_set.contains(p)));
+    // Every point of one that lies on the other is in a pair.
+    let (ta, tb) = (SurfaceTree::new(&a, &options).unwrap(), SurfaceTree::new(&b, &options).unwrap());
+    let found = traverse(&ta, &tb, &TraverseOptions::default(), |_| Verdict::Descend, &Job::new());
+    assert!(hulls.pairs.len() <= found.pairs.len());
+}
+
+#[test]
+fn flatness_cuts_where_the_surface_is_flat_enough() {
+    let surface = random_surface(kinds()[0], &mut Random(14));
+    let options = BvhOptions { flatness: Some(2e-3), ..BvhOptions::default() };
+    let tree = SurfaceTree::new(&surface, &options).unwrap();
+    let leaves = tree.level(6);
+    assert!(leaves.len() < 4096 && leaves.len() > 16);
+    for &leaf in &leaves {
+        assert!(tree.children(leaf).is_none());
+        assert!(leaf.depth() == 12 || tree.node(leaf).radius() <= 2e-3);
+        assert!(tree.torus(leaf).is_some());
+        if leaf.depth() > 2 {
+            let above = NodeId { index: leaf.index / 4, ..leaf };
+            assert!(tree.node(above).radius() > 2e-3);
+        }
+    }
+    assert!(tree.build_all(true, &Job::new()).unwrap());
+    assert!(tree.memory().total() < 4096 * 2 * 64);
+    validate(&surface, &tree, samples(&surface, 50, &mut Random(15))).unwrap();
+}
+
+#[test]
+fn memory_is_counted_to_the_byte() {
+    let surface = random_surface(kinds()[0], &mut Random(16));
+    let tree = SurfaceTree::new(&surface, &BvhOptions::default()).unwrap();
+    tree.build_all(true, &Job::new()).unwrap();
+    let memory = tree.memory();
+    assert_eq!((memory.nodes, memory.tori), (8191, 4096));
+    assert!(memory.node_bytes >= 8192 * 64 && memory.torus_bytes >= 4096 * size_of::<LeafTorus>());
+    assert!(size_of::<Node>() <= 80 && size_of::<LeafTorus>() <= 100);
+    assert!(memory.total() < 1_200_000, "{memory:?}");
+}
+
+#[test]
+fn nodes_and_parameters_find_each_other() {
+    let mut random = Random(17);
+    let surface = random_surface(kinds()[1], &mut random);
+    let tree = SurfaceTree::new(&surface, &BvhOptions { height: 4, ..BvhOptions::default() }).unwrap();
+    for level in 0..=4 {
+        let nodes = tree.level(level);
+        assert_eq!(nodes.len(), 6 << (2 * level));
+        for &id in nodes.iter().step_by(7) {
+            let [low, high] = tree.rectangle(id);
+            assert_eq!(tree.node_over(level, 0.5 * (low + high)), id);
+        }
+    }
+    let [[u0, u1], [v0, v1]] = surface.domain();
+    assert_eq!(tree.rectangle(tree.root()), [DVec2::new(u0, v0), DVec2::new(u1, v1)]);
+}
+
+#[test]
+fn what_cannot_be_bounded_is_named() {
+    let k = || Knots::bezier(1, 0.0, 1.0).unwrap();
+    let line = (0..4).map(|i| DVec3::X * f64::from(i)).collect();
+    let line = Surface::new(k(), k(), line, None).unwrap();
+    let error = SurfaceTree::new(&line, &BvhOptions::default()).unwrap_err();
+    assert!(matches!(error, BvhError::Extent { patch: 0, area: 0.0, .. }), "{error}");
+    let huge =
+        Surface::new(k(), k(), [0.0, 1e200, 2e200, 1e201].map(|x| DVec3::new(x, x * x.sin(), 1.0)).to_vec(), None);
+    let error = SurfaceTree::new(&huge.unwrap(), &BvhOptions::default()).unwrap_err();
+    assert!(error.to_string().contains("1e30") || error.to_string().contains("1000000"), "{error}");
+    let square = Surface::bilinear([DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X + DVec3::Y]).unwrap();
+    let options = BvhOptions { height: 16, ..BvhOptions::default() };
+    assert_eq!(SurfaceTree::new(&square, &options).unwrap_err(), BvhError::Height { got: 16, limit: 15 });
+    let options = BvhOptions { height: 15, ..BvhOptions::default() };
+    let tree = SurfaceTree::new(&square, &options).unwrap();
+    let error = tree.build_all(true, &Job::new()).unwrap_err();
+    assert!(matches!(error, BvhError::Memory { height: 15, patches: 1, limit, .. } if limit == 4 << 30), "{error}");
+    let options = BvhOptions { flatness: Some(f64::NAN), ..BvhOptions::default() };
+    assert!(matches!(SurfaceTree::new(&square, &options), Err(BvhError::Flatness { .. })));
+}
