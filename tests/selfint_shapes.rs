@@ -295,6 +295,9 @@ fn bad_input_has_a_defined_answer_in_bounded_time() {
         // Caps bound the work; the time is generous because a test machine may be busy.
         assert!(started.elapsed().as_secs_f64() < 30.0, "{name}");
         assert!(found.result.miters.len() <= 2, "{name}: a cusp edge is no thousand miter points");
+        let cusps = found.result.curves.iter().filter(|c| c.kind == CurveKind::CuspEdge).count();
+        assert_eq!(cusps, usize::from(name.contains("cusp") || name.contains("folded")), "{name}");
+        assert_eq!(found.result.complete, *name == "flat", "{name}: what is not proved is not complete");
     }
 }
 

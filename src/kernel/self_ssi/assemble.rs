@@ -71,7 +71,7 @@ impl<'a> Assembler<'a> {
     }
 
     /// The bound of one chord on both sheets.
-    fn bound(&mut self, a: [DVec2; 2], b: [DVec2; 2]) -> f64 {
+    pub fn bound(&mut self, a: [DVec2; 2], b: [DVec2; 2]) -> f64 {
         let apart = |n: [DVec2; 2]| self.sheet.point(n[0]).distance(self.sheet.point(n[1]));
         let ends = 0.5 * apart(a).max(apart(b));
         let mut worst = 0.0_f64;

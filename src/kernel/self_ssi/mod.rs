@@ -184,6 +184,9 @@ pub fn self_intersect(
     }
     for cusp in &miters.cusps {
         let points = cusp.iter().map(|&c| assembler.point([c, c])).collect();
+        let bound = cusp.windows(2).map(|s| assembler.bound([s[0]; 2], [s[1]; 2])).fold(0.0, f64::max) * sheet.scale;
+        let strip = cusp.iter().fold(Rect::new(cusp[0], cusp[0]), |r, &c| r.union(&Rect::new(c, c)));
+        result.unresolved.push(open([strip; 2], "pairs in the strip beside a cusp edge were not examined"));
         let [start, end] = [cusp.first(), cusp.last()].map(|c| {
             let on_border = c.is_some_and(|c| c.min_element() == 0.0 || c.max_element() == 1.0);
             if on_border { CurveEnd::Boundary } else { CurveEnd::Unresolved }
@@ -193,7 +196,7 @@ pub fn self_intersect(
             closed: false,
             ends: [start, end],
             end_ids: [None; 2],
-            error_bound: tol,
+            error_bound: bound,
             region: None,
             points,
         });
