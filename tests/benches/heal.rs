@@ -189,7 +189,7 @@ fn rays() {
     let points = g.iter().flat_map(|&y| g.iter().map(move |&x| f(x, y))).collect();
     let surface = Arc::new(Surface::new(knots.clone(), knots, points, None).unwrap());
     let start = Instant::now();
-    let set = SurfaceSet::new(vec![(0, surface)], 2.5e-4, &Job::new());
+    let set = SurfaceSet::new(vec![(0, surface)], 2e-3, &Job::new());
     let count = set.tree().len();
     row(&format!("tree over {count} triangles"), format!("{:.0} ms", start.elapsed().as_secs_f64() * 1e3), "");
     let mut seed = 1_u64;
