@@ -95,8 +95,10 @@ fn show() {
     }
 }
 
-/// What must not change: numbers of open and closed curves of each kind, of contacts of each kind, of regions.
-fn topology(result: &Intersection) -> (Vec<(CurveKind, bool, usize)>, Vec<(JunctionKind, usize)>, usize, bool) {
+/// Numbers of open and closed curves of each kind, of contacts of each kind, of regions; whether complete.
+type Topology = (Vec<(CurveKind, bool, usize)>, Vec<(JunctionKind, usize)>, usize, bool);
+
+fn topology(result: &Intersection) -> Topology {
     let mut curves: Vec<(CurveKind, bool, usize)> = Vec::new();
     for c in &result.curves {
         match curves.iter_mut().find(|(kind, closed, _)| (*kind, *closed) == (c.kind, c.closed)) {

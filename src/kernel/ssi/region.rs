@@ -208,8 +208,7 @@ fn same_place(x: &RegionPoint, y: &RegionPoint) -> bool {
 fn chain(mut pieces: Vec<Vec<RegionPoint>>) -> Vec<Vec<RegionPoint>> {
     let mut loops = Vec::new();
     while let Some(mut line) = pieces.pop() {
-        loop {
-            let (Some(first), Some(last)) = (line.first().copied(), line.last().copied()) else { break };
+        while let (Some(first), Some(last)) = (line.first().copied(), line.last().copied()) {
             if line.len() > 3 && first.p.distance(last.p) < JOINED {
                 if same_place(&first, &last) {
                     line.pop();
