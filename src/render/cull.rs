@@ -88,8 +88,9 @@ mod tests {
         assert_eq!(frustum.side(&at(0.0, 0.0, -1e6)), Side::Inside);
         assert_eq!(frustum.side(&at(0.0, 0.0, 12.0)), Side::Outside);
         assert_eq!(frustum.side(&at(0.0, 0.0, 10.0)), Side::Crossing);
-        // Half the field of view is 0.5 rad: at distance 10 the edge is at 10 tan(0.5) = 5.463.
-        assert_eq!(frustum.side(&at(6.2, 0.0, 0.0)), Side::Outside);
+        // Half the field of view is 0.5 rad: at distance 10 the edge is at 10 tan(0.5) = 5.463, and at
+        // 5.736 on the far side of a box of half size 0.5.
+        assert_eq!(frustum.side(&at(6.4, 0.0, 0.0)), Side::Outside);
         assert_eq!(frustum.side(&at(0.0, -5.4, 0.0)), Side::Crossing);
         assert_eq!(frustum.side(&at(0.0, 4.6, 0.0)), Side::Inside);
     }

@@ -297,7 +297,9 @@ pub fn fuzzy(query: &str, text: &str) -> Option<i32> {
         score += if found == 0 || !text[found - 1].is_alphanumeric() { 6 } else { 1 };
         (at, last) = (found + 1, found);
     }
-    Some(score * 100 - text.len() as i32)
+    // A query that ends with a word fits better than one that ends inside it.
+    let ends_word = last != usize::MAX && text.get(last + 1).is_none_or(|c| !c.is_alphanumeric());
+    Some(score * 100 + if ends_word { 50 } else { 0 } - text.len() as i32)
 }
 
 /// The actions that fit `query`, best first; all of them, in menu order, for an empty one.

@@ -1,7 +1,7 @@
 //! The tools: what a click in the view means, what the status line says, what the Tool page shows.
 
 use egui::{Order, Ui, vec2};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::editor::Editor;
 use super::hints::CurveHint;
@@ -196,8 +196,13 @@ impl Editor {
                 let places = [n / 2, n / 3, 2 * n / 3, n / 4, 3 * n / 4, n / 8, 7 * n / 8];
                 let found = places.into_iter().filter(|&k| k < n).find_map(|k| {
                     let pixel = view.project(curve.points[k])?.pixel;
-                    let hit = self.viewport.pick_at(pixel, filter)?;
-                    matches!(hit.target, Target::Curve { curve: c, .. } if c == curve.curve).then_some(pixel)
+                    // Scripts click on whole pixels, so the neighbours must give the same curve.
+                    let around = [DVec2::ZERO, DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y];
+                    let same = around.into_iter().all(|off| {
+                        let hit = self.viewport.pick_at(pixel + off, filter);
+                        hit.is_some_and(|h| matches!(h.target, Target::Curve { curve: c, .. } if c == curve.curve))
+                    });
+                    same.then_some(pixel)
                 });
                 let Some(at) = found.map(|pixel| self.viewport.to_window(pixel)) else { continue };
                 let inside = self.viewport.rect.shrink(2.0).contains(at);
