@@ -194,16 +194,19 @@ impl Editor {
             for curve in &display.curves {
                 let n = curve.points.len();
                 let places = [n / 2, n / 3, 2 * n / 3, n / 4, 3 * n / 4, n / 8, 7 * n / 8];
-                let found = places.into_iter().filter(|&k| k < n).find_map(|k| {
-                    let pixel = view.project(curve.points[k])?.pixel;
-                    // Scripts click on whole pixels, so the neighbours must give the same curve.
-                    let around = [DVec2::ZERO, DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y];
-                    let same = around.into_iter().all(|off| {
-                        let hit = self.viewport.pick_at(pixel + off, filter);
-                        hit.is_some_and(|h| matches!(h.target, Target::Curve { curve: c, .. } if c == curve.curve))
-                    });
-                    same.then_some(pixel)
-                });
+                // Scripts click on whole pixels, so a place whose neighbours give the same curve comes first.
+                let around = [DVec2::ZERO, DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y];
+                let place = |offsets: &[DVec2]| {
+                    places.into_iter().filter(|&k| k < n).find_map(|k| {
+                        let pixel = view.project(curve.points[k])?.pixel;
+                        let gives = |off: &DVec2| {
+                            let hit = self.viewport.pick_at(pixel + 0.5 * *off, filter);
+                            hit.is_some_and(|h| matches!(h.target, Target::Curve { curve: c, .. } if c == curve.curve))
+                        };
+                        offsets.iter().all(gives).then_some(pixel)
+                    })
+                };
+                let found = place(&around).or_else(|| place(&around[..1]));
                 let Some(at) = found.map(|pixel| self.viewport.to_window(pixel)) else { continue };
                 let inside = self.viewport.rect.shrink(2.0).contains(at);
                 if inside {
