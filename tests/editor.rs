@@ -2,6 +2,7 @@
 //! redo, save. Picking is done on the CPU, so all of it runs without a graphics adapter; the test that looks at pictures
 //! reports itself as skipped without one, and `PATCHWRIGHT_REQUIRE_GPU=1` makes that a failure.
 #![cfg(feature = "editor")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test helper may stop the test")]
 
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};

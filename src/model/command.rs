@@ -68,7 +68,7 @@ pub enum Command {
         /// Which one.
         id: EntityId,
         /// What takes its place.
-        patch: Patch,
+        patch: Arc<Patch>,
     },
 }
 
@@ -194,7 +194,7 @@ impl Command {
                 if !matches!(document.get(*id).map(|e| &e.shape), Some(Shape::Patch(_))) {
                     return Err(CommandError::NoPatch { id: id.0 });
                 }
-                next.edit(*id, |e| e.shape = Shape::Patch(Arc::new(patch.clone())));
+                next.edit(*id, |e| e.shape = Shape::Patch(Arc::clone(patch)));
             }
         }
         Ok(next)

@@ -81,10 +81,8 @@ impl Palette {
                         if at == self.chosen && (up || down) {
                             row.scroll_to_me(None);
                         }
-                        if row.clicked() || (enter && at == self.chosen) {
-                            if why_not.is_none() {
-                                answer = Answer::Chosen(info.action);
-                            }
+                        if (row.clicked() || (enter && at == self.chosen)) && why_not.is_none() {
+                            answer = Answer::Chosen(info.action);
                         }
                     }
                 });

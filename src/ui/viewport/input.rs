@@ -113,7 +113,7 @@ impl Viewport {
         self.left_button(ui, response, &mut out, at);
         out.hover = self.hover_at(pixel, filter, points, stamp);
         self.cursor_at = out.hover.as_ref().map(|hit| (hit.point, self.hit_uv(hit)));
-        self.hovered = out.hover.as_ref().and_then(|hit| hit_entity(hit)).or(self.from_list.take());
+        self.hovered = out.hover.as_ref().and_then(hit_entity).or(self.from_list.take());
         if out.click.is_some() {
             let options = self.options(filter, points);
             let mut hits = pick_all(&self.scene, &self.view(), pixel, &options);
