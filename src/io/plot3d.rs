@@ -169,13 +169,24 @@ fn binary_counts(
     dimension: usize,
 ) -> Option<(Vec<[usize; 3]>, usize)> {
     let mut at = 0;
-    let mut next = || {
+    let next = || {
         let value = int(bytes, at, big_endian)?;
         at += 4;
         usize::try_from(value).ok().filter(|&n| n > 0)
     };
+    let counts = block_counts(next, multi_block, dimension, bytes.len() / 4)?;
+    Some((counts, at))
+}
+
+/// The block counts of a header whose whole numbers come from `next`; there cannot be more than `limit` blocks.
+fn block_counts(
+    mut next: impl FnMut() -> Option<usize>,
+    multi_block: bool,
+    dimension: usize,
+    limit: usize,
+) -> Option<Vec<[usize; 3]>> {
     let blocks = if multi_block { next()? } else { 1 };
-    if blocks > MAX_BLOCKS || blocks > bytes.len() / 4 {
+    if blocks > MAX_BLOCKS || blocks > limit {
         return None;
     }
     let mut counts = Vec::with_capacity(blocks);
@@ -186,7 +197,7 @@ fn binary_counts(
         }
         counts.push(count);
     }
-    Some((counts, at))
+    Some(counts)
 }
 
 fn points_of(count: &[usize; 3]) -> Option<usize> {
@@ -285,23 +296,12 @@ fn push_numbers(word: &str, numbers: &mut Vec<f64>) -> bool {
 
 fn ascii_counts(numbers: &[f64], multi_block: bool, dimension: usize) -> Option<(Vec<[usize; 3]>, usize)> {
     let mut at = 0;
-    let mut next = || {
+    let next = || {
         let value = *numbers.get(at)?;
         at += 1;
         (value.fract() == 0.0 && (1.0..1e9).contains(&value)).then_some(value as usize)
     };
-    let blocks = if multi_block { next()? } else { 1 };
-    if blocks > MAX_BLOCKS || blocks > numbers.len() {
-        return None;
-    }
-    let mut counts = Vec::with_capacity(blocks);
-    for _ in 0..blocks {
-        let mut count = [1; 3];
-        for c in &mut count[..dimension] {
-            *c = next()?;
-        }
-        counts.push(count);
-    }
+    let counts = block_counts(next, multi_block, dimension, numbers.len())?;
     Some((counts, at))
 }
 
