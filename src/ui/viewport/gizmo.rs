@@ -129,7 +129,7 @@ impl Viewport {
         painter.circle(here, 7.0, t.label, Stroke::new(2.0, color));
         painter.circle_filled(here, 3.0, color);
         if hot {
-            let text = "Section plane · drag to move · Alt+S off · X flip";
+            let text = "Section plane · drag to move · Alt+S off";
             tag(&painter, t, self.rect, here + vec2(14.0, 10.0), text, color);
         }
     }
