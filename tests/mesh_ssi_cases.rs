@@ -7,8 +7,8 @@ use std::path::Path;
 use glam::DVec3;
 use patchwright::io;
 use patchwright::kernel::job::Job;
+use patchwright::kernel::mesh::body::Body;
 use patchwright::kernel::mesh_ssi::engine::{MeshSsiOptions, intersect_bodies};
-use patchwright::kernel::mesh_ssi::sheet::Body;
 
 const CASES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/cases");
 

@@ -5,7 +5,9 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use super::export_args::{self, ExportArgs};
 use super::{CliError, Common, Exit, ProgressLine};
+use crate::io::export::ExportSummary;
 use crate::io::{self, SaveOptions};
 use crate::model::document::{Document, Shape};
 use crate::model::healing::{self, Healing};
@@ -28,6 +30,9 @@ pub struct Args {
     /// Write the original surfaces and curves too
     #[arg(long)]
     pub with_originals: bool,
+    #[command(flatten)]
+    #[allow(missing_docs, reason = "a text here would become the command's own help")]
+    pub export: ExportArgs,
 }
 
 #[derive(Serialize)]
@@ -39,6 +44,9 @@ struct Output<'a> {
     shared: Vec<SharedOutput<'a>>,
     warnings: Vec<String>,
     time_ms: f64,
+    /// How patches became triangles or grids, for STL, OBJ and Plot3D files.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    export: Option<ExportSummary>,
 }
 
 #[derive(Serialize)]
@@ -69,6 +77,7 @@ struct SharedOutput<'a> {
 
 /// Runs `heal`.
 pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
+    let save = SaveOptions { export: args.export.options()?, ..SaveOptions::default() };
     let text = std::fs::read_to_string(&args.patches)
         .map_err(|error| CliError::failed(format!("cannot read {}: {error}", args.patches.display())))?;
     let mut spec = HealSpec::from_ron(&text)
@@ -95,7 +104,9 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         return Err(CliError::failed("stopped before the first resolution was finished; nothing was written"));
     }
     tell(&healing, common);
-    let saved = io::save(&args.out, &output(&document, &healing, args.with_originals), &SaveOptions::default())?;
+    let saved = io::save(&args.out, &output(&document, &healing, args.with_originals), &save)?;
+    saved.notes.iter().for_each(|note| common.say(format!("  note: {note}")));
+    export_args::tell(&saved, common);
     common.say(format!("{} entities written to {}", saved.entities, args.out.display()));
     let tol = crate::model::resolve::options(&spec, &document).tol;
     common.json(&Output {
@@ -106,6 +117,7 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         shared: shared(&healing),
         warnings: job.warnings(),
         time_ms,
+        export: saved.export,
     })?;
     let reached = healing.patches.iter().all(|(_, p)| p.report.reached);
     if !reached {

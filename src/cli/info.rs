@@ -7,6 +7,8 @@ use serde::Serialize;
 use super::{CliError, Common, Exit};
 use crate::io::{self, ImportReport, Severity};
 use crate::kernel::geom::{Aabb, Knots};
+use crate::kernel::mesh::facets::Facets;
+use crate::kernel::mesh::grid::Grid;
 use crate::model::borders::{Meets, borders};
 use crate::model::document::{Document, Entity, Shape};
 
@@ -27,6 +29,7 @@ struct Info {
     surfaces: usize,
     curves: usize,
     patches: usize,
+    meshes: usize,
     bounds: Option<Bounds>,
     /// How the borders of the whole surfaces meet.
     borders: BorderInfo,
@@ -99,7 +102,58 @@ struct EntityInfo {
     spans: Vec<usize>,
     domain: Vec<[f64; 2]>,
     rational: bool,
+    /// Of a mesh or block.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    facets: Option<FacetsInfo>,
     bounds: Option<Bounds>,
+}
+
+#[derive(Serialize)]
+struct FacetsInfo {
+    /// The counts of a block in i, j, k.
+    counts: Option<[usize; 3]>,
+    vertices: usize,
+    triangles: usize,
+    area: f64,
+    degenerate: usize,
+    duplicate: usize,
+    border_edges: usize,
+    non_manifold_edges: usize,
+    /// Borders, feature edges and grid lines: what `Chain` of a patch specification counts.
+    chains: usize,
+}
+
+impl FacetsInfo {
+    fn of(facets: &Facets) -> Self {
+        let (mesh, defects) = (facets.mesh(), facets.mesh().defects());
+        Self {
+            counts: facets.grid().map(Grid::counts),
+            vertices: mesh.points().len(),
+            triangles: mesh.triangles().len(),
+            area: mesh.area(),
+            degenerate: defects.degenerate,
+            duplicate: defects.duplicate,
+            border_edges: defects.border_edges,
+            non_manifold_edges: defects.non_manifold_edges,
+            chains: facets.curves().len(),
+        }
+    }
+
+    fn line(&self) -> String {
+        let counts = self.counts.map_or(String::new(), |c| format!("{} x {} x {} points, ", c[0], c[1], c[2]));
+        format!(
+            "{counts}{} vertices, {} triangles, area {}, {} degenerate, {} duplicate, {} border edges, {} non-manifold \
+             edges, {} pickable curves",
+            self.vertices,
+            self.triangles,
+            self.area,
+            self.degenerate,
+            self.duplicate,
+            self.border_edges,
+            self.non_manifold_edges,
+            self.chains
+        )
+    }
 }
 
 impl EntityInfo {
@@ -108,6 +162,8 @@ impl EntityInfo {
             Shape::Surface(s) => ("surface", s.knots().iter().collect(), s.weights().is_some()),
             Shape::Patch(p) => ("patch", p.surface.knots().iter().collect(), p.surface.weights().is_some()),
             Shape::Curve(c) => ("curve", vec![c.knots()], c.weights().is_some()),
+            Shape::Mesh(_) => ("mesh", Vec::new(), false),
+            Shape::Block(_) => ("block", Vec::new(), false),
         };
         Self {
             id: entity.id.0,
@@ -121,11 +177,16 @@ impl EntityInfo {
             spans: knots.iter().map(|k| k.breaks().len() - 1).collect(),
             domain: knots.iter().map(|k| k.domain()).collect(),
             rational,
+            facets: entity.facets().map(|f| FacetsInfo::of(f)),
             bounds: Bounds::of(&entity.bounds()),
         }
     }
 
     fn line(&self) -> String {
+        if let Some(facets) = &self.facets {
+            let hidden = if self.visible { "" } else { ", hidden" };
+            return format!("{} {} `{}`: {}{hidden}", self.kind, self.number, self.name, facets.line());
+        }
         let product = |values: &[usize]| values.iter().map(usize::to_string).collect::<Vec<_>>().join(" x ");
         let domain = self.domain.iter().map(|[a, b]| format!("{a}..{b}")).collect::<Vec<_>>().join(" x ");
         format!(
@@ -147,7 +208,7 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
     let opened = io::open(&args.file)?;
     let document = &opened.document;
     let bounds = document.bounds();
-    let mut numbers = [0; 3];
+    let mut numbers = [0; 4];
     let entities: Vec<EntityInfo> = document
         .entities()
         .iter()
@@ -156,14 +217,16 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
                 Shape::Surface(_) => &mut numbers[0],
                 Shape::Curve(_) => &mut numbers[1],
                 Shape::Patch(_) => &mut numbers[2],
+                Shape::Mesh(_) | Shape::Block(_) => &mut numbers[3],
             };
             *number += 1;
             EntityInfo::of(entity, *number - 1)
         })
         .collect();
-    let [surfaces, curves, patches] = numbers;
+    let [surfaces, curves, patches, meshes] = numbers;
     let unit = document.unit.symbol();
-    common.say(format!("{}: {surfaces} surfaces, {curves} curves, {patches} patches", args.file.display()));
+    let discrete = if meshes > 0 { format!(", {meshes} meshes and blocks") } else { String::new() };
+    common.say(format!("{}: {surfaces} surfaces, {curves} curves, {patches} patches{discrete}", args.file.display()));
     common.say(format!("unit: {}", if unit.is_empty() { "unknown" } else { unit }));
     if let Some(b) = Bounds::of(&bounds) {
         let point = |p: [f64; 3]| format!("({}, {}, {})", p[0], p[1], p[2]);
@@ -189,6 +252,7 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         surfaces,
         curves,
         patches,
+        meshes,
         bounds: Bounds::of(&bounds),
         borders: border,
         entities,

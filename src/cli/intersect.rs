@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use super::{CliError, Common, Exit, ProgressLine, ranges};
 use crate::io::{self, SaveOptions};
-use crate::kernel::geom::{Curve, Surface};
-use crate::kernel::ssi::{Intersection, SsiOptions, intersect};
+use crate::kernel::geom::Curve;
+use crate::kernel::intersect::{self, intersect_with};
+use crate::kernel::mesh::body::Body;
+use crate::kernel::ssi::Intersection;
 use crate::model::document::{Document, Shape};
 
 /// Arguments of `intersect`.
@@ -14,15 +16,16 @@ pub struct Args {
     /// The file to read
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
-    /// The surfaces of the first side, counted from 0 in file order: `0-3,5`
+    /// The bodies of the first side, counted from 0 in file order: `0-3,5`; surfaces first, then meshes and blocks
     #[arg(long, value_name = "LIST")]
     pub a: String,
-    /// The surfaces of the second side
+    /// The bodies of the second side
     #[arg(long, value_name = "LIST")]
     pub b: String,
     /// How: on the exact surfaces (bvh) or on triangulations (mesh)
-    #[arg(long, value_enum, default_value_t = Engine::Bvh)]
-    pub engine: Engine,
+    /// [default: bvh; mesh where a mesh or block takes part]
+    #[arg(long, value_enum)]
+    pub engine: Option<Engine>,
     /// How closely curves follow, in model units [default: 1e-6 of the diagonal]
     #[arg(long, value_name = "T")]
     pub tol: Option<f64>,
@@ -42,29 +45,32 @@ pub enum Engine {
 
 /// Runs `intersect`.
 pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
-    if args.engine == Engine::Mesh {
-        return Err(CliError::BadArguments("--engine mesh is not there yet; use --engine bvh".into()));
-    }
     let numbers = |list: &str| ranges::parse(list).map_err(CliError::BadArguments);
     let (a, b) = (numbers(&args.a)?, numbers(&args.b)?);
     let opened = io::open(&args.file)?;
-    let surfaces: Vec<_> = opened.document.surfaces().map(|(_, s)| s).collect();
-    let pick = |list: &[usize]| -> Result<Vec<(usize, &Surface)>, CliError> {
-        let one = |&n: &usize| match surfaces.get(n) {
-            Some(surface) => Ok((n, surface.as_ref())),
+    let bodies: Vec<Body> = opened.document.bodies().map(|(_, body)| body).collect();
+    let pick = |list: &[usize]| -> Result<Vec<(usize, Body)>, CliError> {
+        let one = |&n: &usize| match bodies.get(n) {
+            Some(body) => Ok((n, body.clone())),
             None => Err(CliError::BadArguments(format!(
                 "there is no surface {n}: {} has {}, counted from 0",
                 args.file.display(),
-                surfaces.len()
+                bodies.len()
             ))),
         };
         list.iter().map(one).collect()
     };
     let (side_a, side_b) = (pick(&a)?, pick(&b)?);
+    let both = || side_a.iter().chain(&side_b).map(|(_, body)| body);
+    let engine = match args.engine {
+        Some(Engine::Bvh) => intersect::Engine::Bvh,
+        Some(Engine::Mesh) => intersect::Engine::Mesh,
+        None => intersect::Engine::for_bodies(both()),
+    };
     let job = super::job();
-    let options = SsiOptions { tol: args.tol, ..SsiOptions::default() };
     let progress = ProgressLine::watch(&job);
-    let result = intersect(&side_a, &side_b, &options, &job).map_err(|e| CliError::BadArguments(e.to_string()))?;
+    let result =
+        intersect_with(engine, &side_a, &side_b, args.tol, &job).map_err(|e| CliError::BadArguments(e.to_string()))?;
     drop(progress);
     for warning in job.warnings() {
         common.warn(warning);

@@ -12,6 +12,7 @@ pub mod convert;
 mod error;
 pub mod examples;
 mod exit;
+pub mod export_args;
 pub mod heal;
 pub mod info;
 mod interrupt;

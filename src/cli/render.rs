@@ -212,9 +212,9 @@ fn keep_only(document: &mut Document, only: &[usize]) -> Result<(), CliError> {
     Ok(())
 }
 
-/// The surfaces with these numbers.
+/// The surfaces, meshes and blocks with these numbers.
 fn numbered(document: &Document, numbers: &[usize], option: &str) -> Result<Vec<EntityId>, CliError> {
-    let all: Vec<EntityId> = document.surfaces().map(|(id, _)| id).collect();
+    let all: Vec<EntityId> = document.bodies().map(|(id, _)| id).collect();
     let pick = |&n: &usize| {
         let none = || format!("{option}: there is no surface {n}, the file has {} (from 0)", all.len());
         all.get(n).copied().ok_or_else(|| CliError::BadArguments(none()))
@@ -289,11 +289,15 @@ fn fill(camera: &mut Camera, viewport: Viewport, scene: &Scene, bounds: &Aabb, f
 fn measure(args: &Args, document: &Document, scene: &Scene) -> Result<(Vec<(Key, Field)>, DeviationReport), CliError> {
     let other = args.against.as_deref().map(crate::io::open).transpose()?;
     let originals = other.as_ref().map_or(document, |opened| &opened.document);
-    let surfaces: Vec<_> = originals.surfaces().enumerate().map(|(n, (_, s))| (n, s.clone())).collect();
+    let surfaces: Vec<_> = originals.bodies().map(|(_, body)| body).enumerate().collect();
     let subjects: Vec<_> = scene
         .items()
         .iter()
-        .filter(|i| i.visible() && (i.kind == ItemKind::Patch || (other.is_some() && i.kind == ItemKind::Surface)))
+        .filter(|i| {
+            i.visible()
+                && (i.kind == ItemKind::Patch
+                    || (other.is_some() && matches!(i.kind, ItemKind::Surface | ItemKind::Mesh)))
+        })
         .collect();
     if subjects.is_empty() || surfaces.is_empty() {
         return Err(CliError::BadArguments(

@@ -117,7 +117,7 @@ impl Session {
             file.sync_data()
         };
         append().map_err(|source| AutosaveError::Folder { path: path.clone(), source })?;
-        let options = SaveOptions { format: Some(Format::Project) };
+        let options = SaveOptions { format: Some(Format::Project), ..SaveOptions::default() };
         super::save(&self.folder.join(DOCUMENT), document, &options)?;
         Ok(())
     }

@@ -9,6 +9,12 @@ pub enum Format {
     Iges,
     /// STEP (ISO 10303-21); read only.
     Step,
+    /// STL, ASCII or binary.
+    Stl,
+    /// Wavefront OBJ, its polygons.
+    Obj,
+    /// Plot3D structured grids.
+    Plot3d,
     /// This program's own project: RON.
     Project,
 }
@@ -17,15 +23,21 @@ pub enum Format {
 pub const PROJECT_EXTENSION: &str = "patchwright.ron";
 
 impl Format {
+    /// The extensions of every format.
+    pub const EXTENSIONS: [(&'static [&'static str], Self); 6] = [
+        (&["igs", "iges"], Self::Iges),
+        (&["stp", "step", "p21"], Self::Step),
+        (&["stl"], Self::Stl),
+        (&["obj"], Self::Obj),
+        (&["xyz", "p3d", "plot3d", "fmt", "xfmt", "grd", "grid", "x", "g"], Self::Plot3d),
+        (&["ron"], Self::Project),
+    ];
+
     /// The format that a file name asks for.
     pub fn of_name(path: &Path) -> Option<Self> {
         let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
-        match name.rsplit_once('.')?.1 {
-            "igs" | "iges" => Some(Self::Iges),
-            "stp" | "step" | "p21" => Some(Self::Step),
-            "ron" => Some(Self::Project),
-            _ => None,
-        }
+        let extension = name.rsplit_once('.')?.1;
+        Self::EXTENSIONS.iter().find(|(names, _)| names.contains(&extension)).map(|(_, format)| *format)
     }
 
     /// The format that the bytes of a file look like.
@@ -37,13 +49,17 @@ impl Format {
         if super::step::part21::looks_like(bytes) {
             return Some(Self::Step);
         }
+        if super::stl::looks_like(bytes) {
+            return Some(Self::Stl);
+        }
         let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes).trim_ascii_start();
         (text.starts_with(b"(") || text.starts_with(b"//") || text.starts_with(b"Project(")).then_some(Self::Project)
     }
 
     /// All formats for an error message.
     pub fn list() -> &'static str {
-        "IGES (.igs, .iges), STEP (.stp, .step; read only) or a project (.patchwright.ron)"
+        "IGES (.igs, .iges), STEP (.stp, .step; read only), STL (.stl), OBJ (.obj), Plot3D (.xyz, .p3d, .fmt) or a project \
+         (.patchwright.ron)"
     }
 
     /// The name for people.
@@ -51,6 +67,9 @@ impl Format {
         match self {
             Self::Iges => "IGES",
             Self::Step => "STEP",
+            Self::Stl => "STL",
+            Self::Obj => "OBJ",
+            Self::Plot3d => "Plot3D",
             Self::Project => "Patchwright project",
         }
     }
@@ -69,6 +88,8 @@ mod tests {
         assert_eq!(Format::of_content(line.as_bytes()), Some(Format::Iges));
         assert_eq!(Format::of_content(b"\n\n(version: 1)"), Some(Format::Project));
         assert_eq!(Format::of_content(b"ISO-10303-21;\nHEADER;"), Some(Format::Step));
+        assert_eq!(Format::of_name(Path::new("hull.XYZ")), Some(Format::Plot3d));
+        assert_eq!(Format::of_content(b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0"), Some(Format::Stl));
         assert_eq!(Format::of_content(b"\x7fELF"), None);
         assert_eq!(Format::of_content(b""), None);
     }

@@ -10,6 +10,8 @@ use crate::model::document::Document;
 
 pub(crate) mod atomic;
 pub mod autosave;
+mod discrete;
+pub mod export;
 mod format;
 pub mod iges;
 pub mod obj;
@@ -21,6 +23,7 @@ pub mod stl;
 mod tidy;
 
 pub use atomic::WriteError;
+pub use discrete::DiscreteError;
 pub use format::{Format, PROJECT_EXTENSION};
 pub use report::{ImportReport, ReportLine, Severity};
 
@@ -58,6 +61,16 @@ pub enum OpenError {
         /// What is wrong with it.
         source: iges::IgesError,
     },
+    /// It is no mesh or grid that can be read.
+    #[error("{} cannot be read as {}: {source}", path.display(), format.name())]
+    Discrete {
+        /// The file.
+        path: PathBuf,
+        /// What it was taken for.
+        format: Format,
+        /// What is wrong with it.
+        source: DiscreteError,
+    },
     /// It is no project that can be read.
     #[error("{} cannot be read: {source}", path.display())]
     Project {
@@ -88,8 +101,18 @@ pub enum SaveError {
         /// What does not fit.
         source: iges::IgesWriteError,
     },
+    /// The document cannot be made into triangles or grids.
+    #[error("cannot save {} as {}: {source}", path.display(), format.name())]
+    Export {
+        /// The file.
+        path: PathBuf,
+        /// The format.
+        format: Format,
+        /// What is wrong.
+        source: export::ExportError,
+    },
     /// The format can be read but not written.
-    #[error("{} files cannot be written: save as IGES (.igs) or as a project (.patchwright.ron)", format.name())]
+    #[error("{} files cannot be written: save as IGES (.igs), STL, OBJ, Plot3D or a project (.patchwright.ron)", format.name())]
     ReadOnly {
         /// The format.
         format: Format,
@@ -115,6 +138,8 @@ pub enum SaveError {
 pub struct SaveOptions {
     /// The format; by extension when left out.
     pub format: Option<Format>,
+    /// How surfaces become triangles (STL, OBJ) or grids (Plot3D).
+    pub export: export::ExportOptions,
 }
 
 /// What was written.
@@ -124,6 +149,8 @@ pub struct Saved {
     pub entities: usize,
     /// What the format could not hold, one line each.
     pub notes: Vec<String>,
+    /// How surfaces became triangles or grids.
+    pub export: Option<export::ExportSummary>,
 }
 
 /// Reads a model.
@@ -138,7 +165,11 @@ pub fn open(path: &Path) -> Result<Opened, OpenError> {
         Some(Format::Project) => {
             project::read(&bytes).map_err(|source| OpenError::Project { path: path.into(), source })
         }
-        None => Err(OpenError::Unknown { path: path.into() }),
+        Some(format @ (Format::Stl | Format::Obj | Format::Plot3d)) => {
+            discrete::open(&bytes, format).map_err(|source| OpenError::Discrete { path: path.into(), format, source })
+        }
+        // Nothing in a Plot3D file says what it is, and its extension may be anything.
+        None => discrete::open(&bytes, Format::Plot3d).map_err(|_| OpenError::Unknown { path: path.into() }),
     }
 }
 
@@ -154,11 +185,12 @@ pub fn save(path: &Path, document: &Document, options: &SaveOptions) -> Result<S
             atomic::write(path, text.as_bytes())?;
             Ok(saved)
         }
+        format @ (Format::Stl | Format::Obj | Format::Plot3d) => export::save(path, document, format, &options.export),
         format @ Format::Step => Err(SaveError::ReadOnly { format }),
         Format::Project => {
             let text = project::write(document).map_err(|source| SaveError::Project { path: path.into(), source })?;
             atomic::write(path, text.as_bytes())?;
-            Ok(Saved { entities: document.entities().len(), notes: Vec::new() })
+            Ok(Saved { entities: document.entities().len(), ..Saved::default() })
         }
     }
 }

@@ -71,7 +71,11 @@ const MAX_BLOCKS: usize = 100_000;
 
 /// Reads all blocks. A file that ends early in ASCII is read up to its last whole block, with a warning.
 pub fn read(bytes: &[u8], report: &mut ImportReport) -> Result<(Layout, Vec<Grid>), Plot3dError> {
-    let found = if is_text(bytes) { read_ascii(bytes, report) } else { read_binary(bytes) };
+    let found = if is_text(bytes) {
+        read_ascii(bytes, report)
+    } else {
+        read_binary(bytes).or_else(|| read_without_marks(bytes, report))
+    };
     let (layout, grids) = found.ok_or(Plot3dError::NoLayout { bytes: bytes.len() })?;
     report.add(Severity::Info, "Plot3D", None, None, format!("read as {layout}"));
     let mut whole = Vec::with_capacity(grids.len());
@@ -155,6 +159,43 @@ fn read_binary(bytes: &[u8]) -> Option<(Layout, Vec<Grid>)> {
                         return Some((layout, grids));
                     }
                 }
+            }
+        }
+    }
+    None
+}
+
+/// Reads a file of Fortran records some of whose marks are wrong: the counts say where records begin and end, and the
+/// length of the file must be what they imply.
+fn read_without_marks(bytes: &[u8], report: &mut ImportReport) -> Option<(Layout, Vec<Grid>)> {
+    for big_endian in [false, true] {
+        for (multi_block, dimension) in [(true, 3), (true, 2), (false, 3), (false, 2)] {
+            // The number of blocks stands in a record of its own.
+            let header: Vec<u8> = if multi_block {
+                [bytes.get(4..8)?, bytes.get(16..).unwrap_or_default()].concat()
+            } else {
+                bytes.get(4..).unwrap_or_default().to_vec()
+            };
+            let Some((counts, length)) = binary_counts(&header, big_endian, multi_block, dimension) else { continue };
+            let before = if multi_block { 4 + 4 + 4 + 4 + (length - 4) + 4 } else { 4 + length + 4 };
+            for (double, blank) in [(true, false), (true, true), (false, false), (false, true)] {
+                let encoding = Encoding::Binary { records: true, big_endian, double };
+                let layout = Layout { encoding, multi_block, dimension, blank };
+                let expected = expected_bytes(&counts, &layout).and_then(|n| n.checked_add(before + 8 * counts.len()));
+                if expected != Some(bytes.len()) {
+                    continue;
+                }
+                let mut payload = Vec::with_capacity(bytes.len());
+                let mut at = before;
+                for count in &counts {
+                    let length = expected_bytes(std::slice::from_ref(count), &layout)?;
+                    payload.extend_from_slice(bytes.get(at + 4..at + 4 + length)?);
+                    at += length + 8;
+                }
+                let grids = binary_blocks(&payload, &counts, &layout)?;
+                let reason = "record marks do not fit the records; the counts were followed instead";
+                report.add(Severity::Warning, "Plot3D", None, None, reason);
+                return Some((layout, grids));
             }
         }
     }

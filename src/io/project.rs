@@ -1,12 +1,12 @@
 //! The project: a whole document as RON, healed patches with their specifications and reports included.
 //!
 //! ```text
-//! (version: 1, program: "Patchwright 0.1.0", unit: Millimetre, next_id: 2, entities: [
+//! (version: 2, program: "Patchwright 0.1.0", unit: Millimetre, next_id: 2, entities: [
 //!   (id: 0, name: "hood", visible: true, color: None, shape: Surface((knots: (..), points: [..], weights: None))),
 //! ])
 //! ```
 //!
-//! Numbers are written so that they read back bit for bit. A file of a later version is refused by its number;
+//! Version 2 added meshes and blocks; projects of version 1 are read. Numbers are written so that they read back bit for bit. A file of a later version is refused by its number;
 //! an entity whose numbers make no curve or surface is reported and loses itself only.
 
 use std::collections::HashSet;
@@ -17,11 +17,12 @@ use serde::{Deserialize, Serialize};
 
 use super::{ImportReport, Opened, Severity};
 use crate::kernel::geom::{Curve, Knots, Surface};
+use crate::kernel::mesh::facets::{Facets, FacetsData};
 use crate::model::document::{Document, Entity, EntityId, Patch, Shape, Unit};
 use crate::model::spec::{PatchReport, PatchSpec};
 
 /// The version that is written. Older versions are read, later ones refused.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 
 /// Why a file is no project that can be read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -80,6 +81,8 @@ enum ShapeOut<'a> {
     Surface(&'a Surface),
     Curve(&'a Curve),
     Patch(PatchOut<'a>),
+    Mesh(&'a Facets),
+    Block(&'a Facets),
 }
 
 #[derive(Serialize)]
@@ -116,6 +119,8 @@ enum ShapeIn {
     Surface(SurfaceIn),
     Curve(CurveIn),
     Patch(Box<PatchIn>),
+    Mesh(FacetsData),
+    Block(FacetsData),
 }
 
 #[derive(Deserialize)]
@@ -162,6 +167,8 @@ impl ShapeIn {
             Self::Surface(_) => "surface",
             Self::Curve(_) => "curve",
             Self::Patch(_) => "patch",
+            Self::Mesh(_) => "mesh",
+            Self::Block(_) => "block",
         }
     }
 
@@ -172,6 +179,8 @@ impl ShapeIn {
                 let knots = Knots::new(curve.knots.degree, curve.knots.values).map_err(|e| format!("knots: {e}"))?;
                 Shape::Curve(Arc::new(Curve::new(knots, curve.points, curve.weights).map_err(|e| e.to_string())?))
             }
+            Self::Mesh(data) => Shape::Mesh(Arc::new(Facets::try_from(data).map_err(|e| e.to_string())?)),
+            Self::Block(data) => Shape::Block(Arc::new(Facets::try_from(data).map_err(|e| e.to_string())?)),
             Self::Patch(patch) => {
                 let surface = patch.surface.checked()?;
                 Shape::Patch(Arc::new(Patch { surface, spec: patch.spec, report: patch.report }))
@@ -200,6 +209,8 @@ impl<'a> EntityOut<'a> {
         let shape = match &entity.shape {
             Shape::Surface(surface) => ShapeOut::Surface(surface),
             Shape::Curve(curve) => ShapeOut::Curve(curve),
+            Shape::Mesh(facets) => ShapeOut::Mesh(facets),
+            Shape::Block(facets) => ShapeOut::Block(facets),
             Shape::Patch(patch) => {
                 ShapeOut::Patch(PatchOut { surface: &patch.surface, spec: &patch.spec, report: &patch.report })
             }
@@ -251,6 +262,7 @@ pub fn read(bytes: &[u8]) -> Result<Opened, ProjectError> {
     let document = Document::from_parts(project.unit, entities, next_id);
     report.surfaces = document.surfaces().count() + document.patches().count();
     report.curves = document.curves().count();
+    report.meshes = document.meshes().count();
     Ok(Opened { document, report })
 }
 
@@ -326,10 +338,10 @@ mod tests {
     #[test]
     fn later_versions_are_refused_by_number() {
         let text = write(&document()).unwrap();
-        let newer = text.replacen("version: 1", "version: 7", 1);
-        assert_eq!(read(newer.as_bytes()).unwrap_err(), ProjectError::TooNew { got: 7, limit: 1 });
-        let unreadable = "(version: 2, something: New)";
-        assert_eq!(read(unreadable.as_bytes()).unwrap_err(), ProjectError::TooNew { got: 2, limit: 1 });
+        let newer = text.replacen(&format!("version: {VERSION}"), "version: 7", 1);
+        assert_eq!(read(newer.as_bytes()).unwrap_err(), ProjectError::TooNew { got: 7, limit: VERSION });
+        let unreadable = "(version: 9, something: New)";
+        assert_eq!(read(unreadable.as_bytes()).unwrap_err(), ProjectError::TooNew { got: 9, limit: VERSION });
         assert!(matches!(read(b"(version: 1, unit: Cubit)"), Err(ProjectError::Syntax { line: 1, .. })));
         assert_eq!(read(b"(ve\xff").unwrap_err(), ProjectError::NotText { at: 3 });
     }

@@ -65,6 +65,9 @@ pub struct ImportReport {
     pub surfaces: usize,
     /// Free curves that were read.
     pub curves: usize,
+    /// Meshes and structured blocks that were read.
+    #[serde(default)]
+    pub meshes: usize,
     /// Everything else worth knowing, in file order.
     pub lines: Vec<ReportLine>,
 }

@@ -1,21 +1,22 @@
 //! STL files, binary and ASCII, in and out.
 //!
 //! A file is binary when its length is what its triangle count says, whatever its header begins with (many
-//! binary files begin with `solid`); else ASCII when it begins with `solid`; else it is read as binary up to
-//! its last whole triangle, with a warning. Solids keep their names as groups. Equal corners become one vertex.
+//! binary files begin with `solid`); else ASCII when its beginning is text that speaks of facets, whether or not it
+//! begins with `solid`; else it is read as binary up to its last whole triangle, with a warning. Solids keep their names as groups. Equal corners become one vertex.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::report::{ImportReport, Severity};
 use crate::kernel::mesh::tri_mesh::{Group, TriMesh};
-use crate::kernel::mesh::weld::Welder;
+use crate::kernel::mesh::weld::{Welder, weld};
 
 const HEADER: usize = 84;
 const RECORD: usize = 50;
 
 /// Whether these bytes are an STL file.
 pub fn looks_like(bytes: &[u8]) -> bool {
-    is_exact_binary(bytes) || (starts_with_word(bytes, "solid") && contains_word(bytes, "facet"))
+    is_exact_binary(bytes) || is_ascii(bytes)
 }
 
 fn declared_count(bytes: &[u8]) -> Option<usize> {
@@ -31,6 +32,13 @@ fn starts_with_word(bytes: &[u8], word: &str) -> bool {
     bytes.trim_ascii_start().get(..word.len()).is_some_and(|b| b.eq_ignore_ascii_case(word.as_bytes()))
 }
 
+/// Whether the beginning is text that speaks of facets. Coordinates in bytes soon have one that no text has.
+fn is_ascii(bytes: &[u8]) -> bool {
+    let head = &bytes[..bytes.len().min(4096)];
+    let text = head.iter().all(|&b| b >= b' ' || b.is_ascii_whitespace());
+    text && contains_word(head, "facet") && contains_word(head, "vertex")
+}
+
 fn contains_word(bytes: &[u8], word: &str) -> bool {
     let head = &bytes[..bytes.len().min(4096)];
     head.windows(word.len()).any(|w| w.eq_ignore_ascii_case(word.as_bytes()))
@@ -38,8 +46,17 @@ fn contains_word(bytes: &[u8], word: &str) -> bool {
 
 /// Reads a mesh; what had to be left out is in the report.
 pub fn read(bytes: &[u8], report: &mut ImportReport) -> TriMesh {
-    let ascii = !is_exact_binary(bytes) && starts_with_word(bytes, "solid") && contains_word(bytes, "facet");
-    if ascii { read_ascii(bytes, report) } else { read_binary(bytes, report) }
+    if !is_exact_binary(bytes) && is_ascii(bytes) { read_ascii(bytes, report) } else { read_binary(bytes, report) }
+}
+
+const NOT_FINITE: &str = "with a coordinate that is not a finite number";
+const COLLAPSED: &str = "with two equal corners";
+
+fn skipped(report: &mut ImportReport, count: usize, why: &str) {
+    if count > 0 {
+        let plural = if count == 1 { "triangle" } else { "triangles" };
+        report.add(Severity::Skipped, "STL facet", None, None, format!("{count} {plural} {why}"));
+    }
 }
 
 /// Gathers triangles and counts what cannot be used.
@@ -52,6 +69,7 @@ struct Gatherer {
 }
 
 impl Gatherer {
+    /// For about this many triangles.
     fn new(triangles: usize) -> Self {
         Self {
             welder: Welder::with_capacity(triangles / 2 + 16),
@@ -83,14 +101,8 @@ impl Gatherer {
     }
 
     fn finish(self, report: &mut ImportReport) -> TriMesh {
-        let mut skipped = |count: usize, why: &str| {
-            if count > 0 {
-                let plural = if count == 1 { "triangle" } else { "triangles" };
-                report.add(Severity::Skipped, "STL facet", None, None, format!("{count} {plural} {why}"));
-            }
-        };
-        skipped(self.not_finite, "with a coordinate that is not a finite number");
-        skipped(self.collapsed, "with two equal corners");
+        skipped(report, self.not_finite, NOT_FINITE);
+        skipped(report, self.collapsed, COLLAPSED);
         let mut mesh = TriMesh::new(self.welder.into_points(), self.triangles).unwrap_or_default();
         mesh.groups = self.groups;
         mesh
@@ -106,15 +118,40 @@ fn read_binary(bytes: &[u8], report: &mut ImportReport) -> TriMesh {
             format!("the file declares {declared} triangles and holds {there}; those that are there were read");
         report.add(Severity::Warning, "STL header", None, None, reason);
     }
-    let mut gatherer = Gatherer::new(there.min(declared));
-    for record in body.chunks_exact(RECORD).take(declared) {
-        let float = |k: usize| f64::from(f32::from_le_bytes([record[k], record[k + 1], record[k + 2], record[k + 3]]));
-        let corner = |k: usize| DVec3::new(float(k), float(k + 4), float(k + 8));
-        gatherer.add([corner(12), corner(24), corner(36)]);
-    }
+    let records: Vec<&[u8]> = body.chunks_exact(RECORD).take(declared).collect();
+    let corner = |record: &[u8], k: usize| {
+        let float = |at: usize| {
+            let four = record.get(at..at + 4).and_then(|b| b.try_into().ok()).unwrap_or([0xFF; 4]);
+            f64::from(f32::from_le_bytes(four))
+        };
+        DVec3::new(float(12 + 12 * k), float(16 + 12 * k), float(20 + 12 * k))
+    };
+    let whole = |record: &&[u8]| (0..3).all(|k| corner(record, k).is_finite());
+    let usable: Vec<&[u8]> = if records.par_iter().all(whole) {
+        records
+    } else {
+        let usable: Vec<&[u8]> = records.par_iter().copied().filter(|r| whole(r)).collect();
+        skipped(report, records.len() - usable.len(), NOT_FINITE);
+        usable
+    };
+    let Some((points, corners)) = weld(3 * usable.len(), |k| corner(usable[k / 3], k % 3)) else {
+        report.add(Severity::Skipped, "STL", None, None, "it has more corners than can be numbered (2^32)");
+        return TriMesh::default();
+    };
+    let count = usable.len();
+    drop(usable);
+    let triangles: Vec<[u32; 3]> = corners
+        .par_chunks_exact(3)
+        .map(|c| [c[0], c[1], c[2]])
+        .filter(|[a, b, c]| a != b && b != c && c != a)
+        .collect();
+    skipped(report, count - triangles.len(), COLLAPSED);
     let name = String::from_utf8_lossy(&bytes[..bytes.len().min(80)]);
-    gatherer.end_group(name.trim_matches(|c: char| c.is_whitespace() || c == '\0').to_owned());
-    gatherer.finish(report)
+    let name = name.trim_matches(|c: char| c.is_whitespace() || c == '\0').to_owned();
+    let groups = vec![(name, 0, triangles.len())];
+    let mut mesh = TriMesh::new(points, triangles).unwrap_or_default();
+    mesh.set_groups(groups);
+    mesh
 }
 
 fn read_ascii(bytes: &[u8], report: &mut ImportReport) -> TriMesh {

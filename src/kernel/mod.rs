@@ -3,6 +3,7 @@
 pub mod bvh;
 pub mod geom;
 pub mod heal;
+pub mod intersect;
 pub mod job;
 pub mod mesh;
 pub mod mesh_ssi;

@@ -5,6 +5,8 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use crate::kernel::geom::{Aabb, Curve, Surface};
+use crate::kernel::mesh::body::Body;
+use crate::kernel::mesh::facets::Facets;
 use crate::kernel::tol::Tolerances;
 
 /// Names one entity for the life of a document, whatever is added or removed around it.
@@ -67,6 +69,10 @@ pub enum Shape {
     Curve(Arc<Curve>),
     /// A healed patch: its surface, how it was asked for, and the evidence.
     Patch(Arc<Patch>),
+    /// A triangle mesh of the model.
+    Mesh(Arc<Facets>),
+    /// A structured block of the model (Plot3D).
+    Block(Arc<Facets>),
 }
 
 /// A healed patch as the document keeps it.
@@ -101,7 +107,15 @@ impl Entity {
         match &self.shape {
             Shape::Surface(surface) => Some(surface),
             Shape::Patch(patch) => Some(&patch.surface),
-            Shape::Curve(_) => None,
+            Shape::Curve(_) | Shape::Mesh(_) | Shape::Block(_) => None,
+        }
+    }
+
+    /// The triangles of a mesh or block.
+    pub fn facets(&self) -> Option<&Arc<Facets>> {
+        match &self.shape {
+            Shape::Mesh(facets) | Shape::Block(facets) => Some(facets),
+            _ => None,
         }
     }
 
@@ -119,6 +133,7 @@ impl Entity {
             Shape::Surface(surface) => surface.bounds(),
             Shape::Curve(curve) => curve.bounds(),
             Shape::Patch(patch) => patch.surface.bounds(),
+            Shape::Mesh(facets) | Shape::Block(facets) => facets.bounds(),
         }
     }
 }
@@ -171,6 +186,18 @@ impl Document {
     /// The free curves in file order: `Curve(id)` of a patch specification counts these.
     pub fn curves(&self) -> impl Iterator<Item = (EntityId, &Arc<Curve>)> {
         self.entities.iter().filter_map(|e| e.curve().map(|c| (e.id, c)))
+    }
+
+    /// The meshes and blocks in file order: `Chain(mesh: ..)` of a patch specification counts these.
+    pub fn meshes(&self) -> impl Iterator<Item = (EntityId, &Arc<Facets>)> {
+        self.entities.iter().filter_map(|e| e.facets().map(|f| (e.id, f)))
+    }
+
+    /// All originals that can be projected on or intersected, in the order of their numbers: first the surfaces,
+    /// then meshes and blocks.
+    pub fn bodies(&self) -> impl Iterator<Item = (EntityId, Body)> {
+        let surfaces = self.surfaces().map(|(id, s)| (id, Body::Surface(Arc::clone(s))));
+        surfaces.chain(self.meshes().map(|(id, f)| (id, Body::Facets(Arc::clone(f)))))
     }
 
     /// The healed patches.

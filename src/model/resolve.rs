@@ -17,6 +17,7 @@ use crate::kernel::heal::fit::bezier_row;
 use crate::kernel::heal::hardy::HardyOptions;
 use crate::kernel::heal::{HealOptions, PatchInput};
 use crate::kernel::job::Job;
+use crate::kernel::mesh::body::Body;
 use crate::kernel::mesh::surface_set::{Scratch, SurfaceSet};
 
 /// Why a piece names no curve of the document.
@@ -33,6 +34,24 @@ pub enum PieceError {
     /// There are fewer free curves.
     #[error("there is no curve {number}; the model has {count} (numbered from 0)")]
     NoCurve {
+        /// The number asked for.
+        number: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// There are fewer meshes and blocks.
+    #[error("there is no mesh or block {number}; the model has {count} (numbered from 0)")]
+    NoMesh {
+        /// The number asked for.
+        number: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// The mesh or block has fewer curves.
+    #[error("mesh {mesh} has no chain {number}; it has {count} borders, feature edges or grid lines (numbered from 0)")]
+    NoChain {
+        /// The mesh or block.
+        mesh: usize,
         /// The number asked for.
         number: usize,
         /// How many there are.
@@ -89,8 +108,8 @@ pub enum ResolveError {
         /// What is wrong.
         source: PieceError,
     },
-    /// `onto` names a surface that is not there.
-    #[error("`onto` names surface {number}, the model has {count} (numbered from 0)")]
+    /// `onto` names a body that is not there.
+    #[error("`onto` names surface {number}, the model has {count} surfaces, meshes and blocks (numbered from 0)")]
     Onto {
         /// The number asked for.
         number: usize,
@@ -98,7 +117,7 @@ pub enum ResolveError {
         count: usize,
     },
     /// There is nothing to project on.
-    #[error("the model has no surface to heal on")]
+    #[error("the model has no surface, mesh or block to heal on")]
     NoSurfaces,
 }
 
@@ -107,24 +126,24 @@ pub enum ResolveError {
 pub struct Resolved {
     /// The patches.
     pub patches: Vec<PatchInput>,
-    /// The surfaces to project on, with their numbers.
-    pub surfaces: Vec<(usize, Arc<Surface>)>,
+    /// The bodies to project on, with their numbers.
+    pub surfaces: Vec<(usize, Body)>,
     /// How to heal.
     pub options: HealOptions,
 }
 
 /// Turns a specification into kernel input.
 pub fn resolve(spec: &HealSpec, document: &Document, job: &Job) -> Result<Resolved, ResolveError> {
-    let all: Vec<Arc<Surface>> = document.surfaces().map(|(_, s)| Arc::clone(s)).collect();
+    let all: Vec<Body> = document.bodies().map(|(_, body)| body).collect();
     if all.is_empty() {
         return Err(ResolveError::NoSurfaces);
     }
     let numbers = spec.onto.clone().unwrap_or_else(|| (0..all.len()).collect());
     let mut surfaces = Vec::new();
     for number in numbers {
-        let surface = all.get(number).ok_or(ResolveError::Onto { number, count: all.len() })?;
+        let body = all.get(number).ok_or(ResolveError::Onto { number, count: all.len() })?;
         if surfaces.iter().all(|(n, _)| *n != number) {
-            surfaces.push((number, Arc::clone(surface)));
+            surfaces.push((number, body.clone()));
         }
     }
     let options = options(spec, document);
@@ -172,14 +191,14 @@ pub fn options(spec: &HealSpec, document: &Document) -> HealOptions {
 /// Turns pieces into curves; keeps the tessellation that drawn curves need.
 pub struct PieceResolver<'a> {
     document: &'a Document,
-    onto: Vec<(usize, Arc<Surface>)>,
+    onto: Vec<(usize, Body)>,
     options: HealOptions,
     set: Option<Arc<SurfaceSet>>,
 }
 
 impl<'a> PieceResolver<'a> {
-    /// For a document, the surfaces that drawn curves lie on, and the tolerances.
-    pub fn new(document: &'a Document, onto: Vec<(usize, Arc<Surface>)>, options: HealOptions) -> Self {
+    /// For a document, the bodies that drawn curves lie on, and the tolerances.
+    pub fn new(document: &'a Document, onto: Vec<(usize, Body)>, options: HealOptions) -> Self {
         Self { document, onto, options, set: None }
     }
 
@@ -202,6 +221,15 @@ impl<'a> PieceResolver<'a> {
                 let curves: Vec<&Arc<Curve>> = self.document.curves().map(|(_, c)| c).collect();
                 let curve = curves.get(*id).ok_or(PieceError::NoCurve { number: *id, count: curves.len() })?;
                 by_fractions(curve, *from, *to)
+            }
+            Piece::Chain { mesh, chain, from, to } => {
+                let count = self.document.meshes().count();
+                let found = self.document.meshes().nth(*mesh);
+                let (_, facets) = found.ok_or(PieceError::NoMesh { number: *mesh, count })?;
+                let count = facets.curves().len();
+                let found = facets.curves().get(*chain);
+                let found = found.ok_or(PieceError::NoChain { mesh: *mesh, number: *chain, count })?;
+                by_fractions(&found.curve, *from, *to)
             }
             Piece::Line(a, b) => {
                 let (a, b) = (DVec3::from(*a), DVec3::from(*b));
@@ -293,6 +321,9 @@ impl<'a> PieceResolver<'a> {
             }
             Piece::Curve { id, from: a, to: b } => {
                 Piece::Curve { id: *id, from: scale(*a, *b, f), to: scale(*a, *b, t) }
+            }
+            Piece::Chain { mesh, chain, from: a, to: b } => {
+                Piece::Chain { mesh: *mesh, chain: *chain, from: scale(*a, *b, f), to: scale(*a, *b, t) }
             }
             Piece::Iso { surface, at, from: a, to: b } => {
                 let curve = self.curve(piece, job)?;
@@ -407,7 +438,7 @@ mod tests {
     }
 
     fn resolver(document: &Document) -> PieceResolver<'_> {
-        let onto = document.surfaces().enumerate().map(|(k, (_, s))| (k, Arc::clone(s))).collect();
+        let onto = document.bodies().map(|(_, body)| body).enumerate().collect();
         PieceResolver::new(document, onto, HealOptions::of(&document.bounds()))
     }
 

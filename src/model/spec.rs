@@ -18,7 +18,7 @@ pub struct HealSpec {
     /// The largest number of spans along one side.
     #[serde(default = "default_max_resolution")]
     pub max_resolution: usize,
-    /// The surfaces to project on, by number; all when left out.
+    /// The bodies to project on, by number (surfaces first, then meshes and blocks); all when left out.
     #[serde(default)]
     pub onto: Option<Vec<usize>>,
     /// Half the thickness of the box of influence (d of HJR99 (7)); from the corners when left out.
@@ -180,6 +180,17 @@ pub enum Piece {
     Curve {
         /// Its number among the file's curves.
         id: usize,
+        /// Where it starts, 0..=1.
+        from: f64,
+        /// Where it ends, 0..=1.
+        to: f64,
+    },
+    /// A border or feature edge of a mesh or a grid line of a block, between two fractions of its arc length.
+    Chain {
+        /// The number of the mesh or block among the file's meshes and blocks.
+        mesh: usize,
+        /// Its number among the curves of that mesh or block, as `info --all` counts and names them.
+        chain: usize,
         /// Where it starts, 0..=1.
         from: f64,
         /// Where it ends, 0..=1.

@@ -15,7 +15,7 @@ use super::frame::{
 };
 use super::theme::Theme;
 use crate::model::document::EntityId;
-use crate::view::display::{CurveRef, Display as Shown};
+use crate::view::display::Display as Shown;
 use crate::view::scene::{Item, ItemKind, Scene};
 use crate::view::section::SectionPlane;
 use crate::view::viewport::View;
@@ -219,7 +219,7 @@ fn dress(revision: u64, shown: &Shown) -> Dressed {
     });
     let lines = |iso: bool| {
         let mut lines = LineData::new(origin);
-        for curve in shown.curves.iter().filter(|c| matches!(c.curve, CurveRef::Iso(..)) == iso) {
+        for curve in shown.curves.iter().filter(|c| c.curve.is_iso() == iso) {
             lines.push(curve.points.iter().copied());
         }
         (!lines.ends.is_empty()).then(|| Arc::new(lines))

@@ -14,6 +14,7 @@ pub enum Action {
     Save,
     SaveAs,
     SaveSpec,
+    Export,
     Quit,
     Undo,
     Redo,
@@ -134,7 +135,14 @@ use Menu::{Edit, File, Heal, Help, View};
 pub const ACTIONS: &[Info] = &[
     with(
         Icon::Open,
-        entry(Action::Open, File, 0, "Open…", key(CTRL, Key::O), "Open an IGES file or a Patchwright project"),
+        entry(
+            Action::Open,
+            File,
+            0,
+            "Open…",
+            key(CTRL, Key::O),
+            "Open an IGES, STEP, STL, OBJ or Plot3D file or a project",
+        ),
     ),
     entry(Action::OpenExample, File, 0, "Open example…", None, "Open one of the bundled example models"),
     with(
@@ -156,6 +164,14 @@ pub const ACTIONS: &[Info] = &[
         "Save patch specification…",
         None,
         "Write the picked sides of all patches as RON, which the command line heals again",
+    ),
+    entry(
+        Action::Export,
+        File,
+        1,
+        "Export grid or mesh…",
+        key(CTRL, Key::E),
+        "Write patches as a structured Plot3D grid, STL or OBJ with shared edges divided once",
     ),
     entry(
         Action::Quit,

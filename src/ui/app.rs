@@ -172,6 +172,11 @@ impl App {
             Answer::Open(path) => editor.open(vec![path]),
             Answer::Example(name) => editor.open_example(name),
             Answer::Save(what, path, then) => editor.save_to(what, path, then),
+            Answer::Export(path) => {
+                if let Dialog::Export(form) = dialog {
+                    editor.export_to(&form, path);
+                }
+            }
             Answer::Overwrite(what, path, then) => editor.dialog = Some(Dialog::Overwrite(what, path, then)),
             Answer::SaveFirst(then) => editor.save(Some(then)),
             Answer::Discard(Then::Quit) => editor.close(ctx),
@@ -203,6 +208,7 @@ pub fn take_key(input: &mut egui::InputState, modifiers: Modifiers, key: Key) ->
 impl eframe::App for App {
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
         self.editor.poll_files(ctx);
+        self.editor.poll_export();
         self.editor.poll_tool();
         self.editor.poll_autosave();
         if ctx.input(|i| i.viewport().close_requested()) && !self.editor.may_close {

@@ -45,6 +45,12 @@ pub enum Then {
     Example(&'static str),
 }
 
+/// What the system's dialog offers: every extension in small and capital letters, as some systems tell them apart.
+fn extensions() -> Vec<String> {
+    let all = crate::io::Format::EXTENSIONS.iter();
+    all.flat_map(|(names, _)| *names).flat_map(|name| [(*name).to_owned(), name.to_ascii_uppercase()]).collect()
+}
+
 /// A dialog of the system, on a thread of its own: it may block for as long as it likes.
 pub struct Browse(Receiver<Option<PathBuf>>);
 
@@ -54,9 +60,7 @@ impl Browse {
         let (sender, receiver) = std::sync::mpsc::channel();
         let (ctx, name) = (ctx.clone(), name.to_owned());
         let spawned = std::thread::Builder::new().name("file dialog".to_owned()).spawn(move || {
-            let dialog = rfd::FileDialog::new()
-                .add_filter("Surface models", &["igs", "iges", "IGS", "IGES", "ron"])
-                .add_filter("All files", &["*"]);
+            let dialog = rfd::FileDialog::new().add_filter("Models", &extensions()).add_filter("All files", &["*"]);
             let chosen = if save { dialog.set_file_name(name).save_file() } else { dialog.pick_file() };
             let _closed_meanwhile = sender.send(chosen);
             ctx.request_repaint();
@@ -94,7 +98,7 @@ impl PathField {
     }
 
     /// Draws the field; true when Enter was pressed in it or the system's dialog answered.
-    fn show(&mut self, ui: &mut Ui, save: bool) -> bool {
+    pub fn show(&mut self, ui: &mut Ui, save: bool) -> bool {
         let mut done = false;
         if let Some(answer) = self.browse.as_ref().and_then(Browse::poll) {
             self.browse = None;
@@ -118,7 +122,11 @@ impl PathField {
                     self.note = None;
                 }
                 let edit = TextEdit::singleline(&mut self.text)
-                    .hint_text(if save { "Path of the file to write" } else { "Path of an IGES file or a project" })
+                    .hint_text(if save {
+                        "Path of the file to write"
+                    } else {
+                        "Path of a model: IGES, STEP, STL, OBJ, Plot3D or a project"
+                    })
                     .margin(egui::Margin::symmetric(7, 5))
                     .desired_width(f32::INFINITY);
                 let field = ui.add(edit).accessible_name("Path");
@@ -153,6 +161,8 @@ pub enum Dialog {
     Examples,
     /// Where to write.
     Save(SaveWhat, PathField, Option<Then>),
+    /// What goes into a grid or mesh, and where.
+    Export(Box<super::export::ExportForm>),
     /// The file is there already.
     Overwrite(SaveWhat, PathBuf, Option<Then>),
     /// There are unsaved changes.
@@ -190,6 +200,7 @@ pub enum Answer {
     Example(&'static str),
     Save(SaveWhat, PathBuf, Option<Then>),
     Overwrite(SaveWhat, PathBuf, Option<Then>),
+    Export(PathBuf),
     SaveFirst(Then),
     Discard(Then),
     Rename(EntityId, String),
@@ -206,11 +217,13 @@ pub fn primary(ui: &mut Ui, text: &str) -> egui::Response {
     ui.add(button)
 }
 
-fn plain(ui: &mut Ui, text: &str) -> egui::Response {
+/// A button that is not the default choice.
+pub fn plain(ui: &mut Ui, text: &str) -> egui::Response {
     ui.add(egui::Button::new(text).min_size(vec2(84.0, 26.0)))
 }
 
-fn buttons<R>(ui: &mut Ui, add: impl FnOnce(&mut Ui) -> R) -> R {
+/// The row of buttons at the foot of a dialog, the default choice first.
+pub fn buttons<R>(ui: &mut Ui, add: impl FnOnce(&mut Ui) -> R) -> R {
     ui.add_space(10.0);
     ui.with_layout(Layout::right_to_left(Align::Min), add).inner
 }
@@ -222,6 +235,7 @@ impl Dialog {
             Self::Open(_) => "open",
             Self::Examples => "examples",
             Self::Save(..) => "save",
+            Self::Export(_) => "export",
             Self::Overwrite(..) => "overwrite",
             Self::Unsaved(_) => "unsaved",
             Self::Problem(_) => "problem",
@@ -245,6 +259,7 @@ impl Dialog {
         let width: f32 = match self {
             Self::Keys => 720.0,
             Self::Open(_) | Self::Save(..) | Self::Examples => 560.0,
+            Self::Export(_) => 620.0,
             _ => 460.0,
         };
         let modal = egui::Modal::new(egui::Id::unique("dialog"))
@@ -281,7 +296,7 @@ impl Dialog {
                 let enter = field.show(ui, true);
                 ui.add_space(2.0);
                 ui.small(match what {
-                    SaveWhat::Model => "The extension says the format: .patchwright.ron keeps everything; .igs holds the surfaces and patches as B-splines for other programs",
+                    SaveWhat::Model => "The extension says the format: .patchwright.ron keeps everything; .igs holds the surfaces and patches as B-splines for other programs; .stl, .obj and .xyz hold triangles or grids (Export has the choices)",
                     SaveWhat::Spec => "RON, for patchwright heal FILE --patches",
                 });
                 let path = field.path();
@@ -297,6 +312,7 @@ impl Dialog {
                     if plain(ui, "Cancel").clicked() { Answer::Close } else { Answer::Stay }
                 })
             }
+            Self::Export(form) => form.show(ui),
             Self::Overwrite(what, path, then) => {
                 ui.heading("Replace the file?");
                 ui.add_space(6.0);

@@ -155,12 +155,16 @@ impl Editor {
             Action::Undo => need(self.history.undo_label().is_some(), "nothing to undo"),
             Action::Redo => need(self.history.redo_label().is_some(), "nothing to redo"),
             Action::Save | Action::SaveAs => need(!self.document().entities().is_empty(), "the model is empty"),
+            Action::Export => need(
+                self.document().entities().iter().any(|e| e.curve().is_none()),
+                "there is no surface, patch, mesh or block",
+            ),
             Action::SaveSpec => need(self.document().patches().next().is_some(), "there are no patches yet"),
             Action::Delete | Action::Hide | Action::Isolate | Action::Deselect => need(selected, "nothing is selected"),
             Action::Rename => need(self.selection.ids().len() == 1, "select one entity"),
             Action::SelectAll => need(self.document().entities().iter().any(|e| e.visible), "nothing is visible"),
             Action::ShowAll => need(self.document().entities().iter().any(|e| !e.visible), "everything is visible"),
-            Action::PatchTool => need(self.document().surfaces().next().is_some(), "there is no surface to heal"),
+            Action::PatchTool => need(self.document().bodies().next().is_some(), "there is nothing to heal"),
             Action::FrameAll => need(!self.document().entities().is_empty(), "the model is empty"),
             Action::FrameSelection => need(selected, "nothing is selected"),
             Action::CancelJobs => need(!self.jobs.active().is_empty(), "nothing is running"),
@@ -204,6 +208,7 @@ impl Editor {
             Action::Save => self.save(None),
             Action::SaveAs => self.ask_where(SaveWhat::Model, None),
             Action::SaveSpec => self.ask_where(SaveWhat::Spec, None),
+            Action::Export => self.ask_export(),
             Action::Quit => self.quit(ctx),
             Action::Undo => {
                 if let Some(label) = self.history.undo().map(str::to_owned) {

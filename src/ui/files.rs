@@ -37,6 +37,8 @@ pub struct Files {
     pub report: Option<ImportReport>,
     /// What was read last.
     pub source: Option<PathBuf>,
+    /// What is being exported.
+    pub exporting: Option<Ticket<Result<(PathBuf, Saved), String>>>,
     opening: Option<Ticket<Read>>,
     saving: Option<(Ticket<Written>, Option<Then>)>,
 }
@@ -86,16 +88,20 @@ impl Editor {
 
     /// Asks where to write.
     pub fn ask_where(&mut self, what: SaveWhat, then: Option<Then>) {
+        let path = match what {
+            SaveWhat::Model => self.beside_source(&format!("healed.{}", io::PROJECT_EXTENSION)),
+            SaveWhat::Spec => self.beside_source("patches.ron"),
+        };
+        self.dialog = Some(Dialog::Save(what, PathField::new(path), then));
+    }
+
+    /// A path beside the file that was read, with its name and this ending.
+    pub fn beside_source(&self, ending: &str) -> String {
         let source = self.files.target.as_ref().or(self.files.source.as_ref());
         let folder = source.and_then(|p| p.parent()).map(Path::to_path_buf).unwrap_or_default();
         let name = source.map_or_else(|| self.files.title.clone(), |p| file_name(p));
         let stem = name.split('.').next().filter(|s| !s.is_empty()).unwrap_or("model").to_owned();
-        let suggestion = match what {
-            SaveWhat::Model => format!("{stem}-healed.{}", io::PROJECT_EXTENSION),
-            SaveWhat::Spec => format!("{stem}-patches.ron"),
-        };
-        let path = folder.join(suggestion).display().to_string();
-        self.dialog = Some(Dialog::Save(what, PathField::new(path), then));
+        folder.join(format!("{stem}-{ending}")).display().to_string()
     }
 
     /// Writes to a file.
@@ -245,6 +251,7 @@ fn read(paths: &[PathBuf], job: &crate::kernel::job::Job) -> Result<(Document, I
                 }
                 report.surfaces += opened.report.surfaces;
                 report.curves += opened.report.curves;
+                report.meshes += opened.report.meshes;
                 report.lines.extend(opened.report.lines);
             }
         }
@@ -269,7 +276,7 @@ fn write_spec(path: &Path, document: &Document) -> Result<Saved, String> {
         Ok(())
     };
     write().map_err(|e| format!("cannot write {}: {e}", path.display()))?;
-    Ok(Saved { entities: spec.patches.len(), notes: Vec::new() })
+    Ok(Saved { entities: spec.patches.len(), ..Saved::default() })
 }
 
 /// The bundled examples: names and what each shows.

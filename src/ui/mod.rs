@@ -7,6 +7,7 @@ mod autosave;
 mod bars;
 mod dialogs;
 mod editor;
+mod export;
 mod files;
 mod hints;
 mod icons;

@@ -8,8 +8,10 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
+use super::facet_shading::shaded;
 use super::segment_tree::{Segment, SegmentTree};
 use crate::kernel::geom::{Aabb, Curve, Direction, Knots, Side, Surface};
+use crate::kernel::mesh::facets::{FacetCurve, FacetCurveKind, Facets};
 use crate::kernel::mesh::tessellate::{SurfaceMesh, TessellateOptions, grid_lines, tessellate_on};
 use crate::kernel::mesh::tri_tree::TriTree;
 use crate::model::document::EntityId;
@@ -18,6 +20,8 @@ use crate::model::document::EntityId;
 const MAX_SEGMENTS: usize = 8192;
 /// The most parts along one direction of a surface.
 const MAX_PARTS: usize = 512;
+/// The most inner grid lines of a block.
+const MAX_GRID_LINES: usize = 768;
 /// The most iso-lines along one direction.
 const MAX_ISO: usize = 15;
 
@@ -30,14 +34,23 @@ pub enum CurveRef {
     Border(EntityId, Side),
     /// An iso-curve of a surface: the direction that is fixed and its value.
     Iso(EntityId, Direction, f64),
+    /// A border or feature edge of a mesh, or a border line of a block, by its place among its curves.
+    Chain(EntityId, u32),
+    /// A grid line inside a face of a block, by its place among the block's curves.
+    GridLine(EntityId, u32),
 }
 
 impl CurveRef {
     /// The entity it belongs to.
     pub fn entity(&self) -> EntityId {
         match *self {
-            Self::Free(id) | Self::Border(id, _) | Self::Iso(id, ..) => id,
+            Self::Free(id) | Self::Border(id, _) | Self::Iso(id, ..) | Self::Chain(id, _) | Self::GridLine(id, _) => id,
         }
+    }
+
+    /// Whether it lies inside a surface and is drawn only where iso-lines are.
+    pub fn is_iso(&self) -> bool {
+        matches!(self, Self::Iso(..) | Self::GridLine(..))
     }
 }
 
@@ -48,6 +61,8 @@ pub enum Geometry {
     Surface(Arc<Surface>),
     /// A free curve.
     Curve(Arc<Curve>),
+    /// A mesh or block.
+    Facets(Arc<Facets>),
 }
 
 impl Geometry {
@@ -56,7 +71,21 @@ impl Geometry {
         match self {
             Self::Surface(surface) => surface.bounds(),
             Self::Curve(curve) => curve.bounds(),
+            Self::Facets(facets) => facets.bounds(),
         }
+    }
+
+    /// A border, feature edge or grid line of a mesh or block.
+    fn facet_curve(&self, curve: &CurveRef) -> Option<&FacetCurve> {
+        match (self, curve) {
+            (Self::Facets(f), CurveRef::Chain(_, k) | CurveRef::GridLine(_, k)) => f.curves().get(*k as usize),
+            _ => None,
+        }
+    }
+
+    /// Whether its display is the same at every size: triangles that a file has are neither refined nor thinned.
+    pub fn is_fixed(&self) -> bool {
+        matches!(self, Self::Facets(_))
     }
 
     /// Whether it is the same thing in memory.
@@ -64,6 +93,7 @@ impl Geometry {
         match (self, other) {
             (Self::Surface(a), Self::Surface(b)) => Arc::ptr_eq(a, b),
             (Self::Curve(a), Self::Curve(b)) => Arc::ptr_eq(a, b),
+            (Self::Facets(a), Self::Facets(b)) => Arc::ptr_eq(a, b),
             _ => false,
         }
     }
@@ -76,7 +106,7 @@ impl Geometry {
                 Some(s.domain()[0])
             }
             (Self::Surface(s), CurveRef::Border(..) | CurveRef::Iso(..)) => Some(s.domain()[1]),
-            _ => None,
+            _ => self.facet_curve(curve).map(|c| c.curve.domain()),
         }
     }
 
@@ -91,7 +121,7 @@ impl Geometry {
             CurveRef::Border(_, Side::UMin) => Some(DVec2::new(u[0], t)),
             CurveRef::Iso(_, Direction::U, c) => Some(DVec2::new(c, t)),
             CurveRef::Iso(_, Direction::V, c) => Some(DVec2::new(t, c)),
-            CurveRef::Free(_) => None,
+            CurveRef::Free(_) | CurveRef::Chain(..) | CurveRef::GridLine(..) => None,
         }
     }
 
@@ -101,7 +131,7 @@ impl Geometry {
             (Self::Curve(c), CurveRef::Free(_)) => Some(c.as_ref().clone()),
             (Self::Surface(s), CurveRef::Border(_, side)) => s.border(*side).ok(),
             (Self::Surface(s), CurveRef::Iso(_, fixed, c)) => s.iso_curve(*fixed, *c).ok(),
-            _ => None,
+            _ => self.facet_curve(curve).map(|c| c.curve.clone()),
         }
     }
 
@@ -113,7 +143,10 @@ impl Geometry {
                 &s.knots()[0]
             }
             (Self::Surface(s), CurveRef::Border(..) | CurveRef::Iso(..)) => &s.knots()[1],
-            _ => return Vec::new(),
+            _ => match self.facet_curve(curve) {
+                Some(chain) => chain.curve.knots(),
+                None => return Vec::new(),
+            },
         };
         let breaks = knots.breaks();
         breaks[1..breaks.len() - 1].to_vec()
@@ -126,12 +159,16 @@ impl Geometry {
                 let [p, d, dd, _] = c.derivatives(t, 2);
                 Some([p, d, dd])
             }
+            Self::Facets(_) => {
+                let [p, d, dd, _] = self.facet_curve(curve)?.curve.derivatives(t, 2);
+                Some([p, d, dd])
+            }
             Self::Surface(surface) => {
                 let jet = surface.jet(self.curve_uv(curve, t)?, 2);
                 let along_u = match curve {
                     CurveRef::Border(_, side) => matches!(side, Side::VMin | Side::VMax),
                     CurveRef::Iso(_, fixed, _) => *fixed == Direction::V,
-                    CurveRef::Free(_) => return None,
+                    CurveRef::Free(_) | CurveRef::Chain(..) | CurveRef::GridLine(..) => return None,
                 };
                 Some(if along_u { [jet.p(), jet.u(), jet.d[2][0]] } else { [jet.p(), jet.v(), jet.d[0][2]] })
             }
@@ -183,6 +220,7 @@ impl Display {
                 let points = t.iter().map(|&t| curve.eval(t)).collect();
                 (SurfaceMesh::default(), vec![DisplayCurve { curve: CurveRef::Free(id), points, t }], capped)
             }
+            Geometry::Facets(facets) => (shaded(facets.mesh()), facet_curves(id, facets), false),
         };
         let bounds = Aabb::of(curves.iter().flat_map(|c| &c.points).chain(&mesh.points).copied());
         let tree = TriTree::new(mesh.points.clone(), &mesh.triangles);
@@ -274,6 +312,33 @@ fn surface_display(id: EntityId, surface: &Surface, chord_tol: f64) -> (SurfaceM
     // A border that is a point (a pole) is no curve.
     curves.retain(|c| c.points.iter().any(|p| *p != c.points[0]));
     (mesh, curves)
+}
+
+/// The curves of a mesh or block as they are drawn: all borders and feature edges, and of the grid lines of a large
+/// block every n-th.
+fn facet_curves(id: EntityId, facets: &Facets) -> Vec<DisplayCurve> {
+    let inner = facets.curves().iter().filter(|c| c.kind == FacetCurveKind::GridLine).count();
+    let step = inner.div_ceil(MAX_GRID_LINES).max(1);
+    let mut counted = 0;
+    let mut out = Vec::new();
+    for (k, chain) in facets.curves().iter().enumerate() {
+        let curve = if chain.kind == FacetCurveKind::GridLine {
+            counted += 1;
+            if !(counted as usize).is_multiple_of(step) {
+                continue;
+            }
+            CurveRef::GridLine(id, k as u32)
+        } else {
+            CurveRef::Chain(id, k as u32)
+        };
+        // Of degree 1 and clamped: its control points lie at its knots.
+        out.push(DisplayCurve {
+            curve,
+            points: chain.curve.points().to_vec(),
+            t: chain.curve.knots().breaks().to_vec(),
+        });
+    }
+    out
 }
 
 /// Parameters along a curve whose polyline keeps the chord tolerance, and whether the cap cut them short.

@@ -20,6 +20,7 @@ use super::colormap::Rgb;
 use super::display::{CurveRef, Geometry};
 use crate::kernel::geom::{Aabb, Direction, Side, Surface};
 use crate::kernel::job::Job;
+use crate::kernel::mesh::facets::{FacetCurveKind, Facets};
 use crate::kernel::mesh::surface_set::{Scratch, SurfaceSet};
 use crate::model::document::{Document, EntityId, Shape};
 
@@ -190,6 +191,7 @@ pub fn feature_edges(document: &Document, options: &EdgeOptions, job: &Job) -> E
         })
         .collect();
     let mut pieces: Vec<EdgePiece> = found.into_iter().flatten().collect();
+    document.meshes().for_each(|(id, facets)| chains(id, facets, &mut pieces));
     for entity in document.entities() {
         if let Shape::Curve(curve) = &entity.shape {
             let (curve, range) = (CurveRef::Free(entity.id), curve.domain());
@@ -306,6 +308,20 @@ fn near(own: &Part, side: Side, others: &[&Part], uv: DVec2, options: &EdgeOptio
         }
     }
     out
+}
+
+/// The borders and feature edges of a mesh, and the border lines of a block. Whether something else is near is not
+/// looked at: the triangles of a mesh say themselves which of its edges are shared.
+fn chains(id: EntityId, facets: &Facets, out: &mut Vec<EdgePiece>) {
+    for (k, chain) in facets.curves().iter().enumerate() {
+        let kind = match chain.kind {
+            FacetCurveKind::Border | FacetCurveKind::GridBorder => EdgeKind::Free,
+            FacetCurveKind::Feature => EdgeKind::Feature,
+            FacetCurveKind::GridLine => continue,
+        };
+        let (curve, range) = (CurveRef::Chain(id, k as u32), chain.curve.domain());
+        out.push(EdgePiece { curve, range, kind, neighbours: Vec::new(), max_gap: 0.0, max_angle: 0.0 });
+    }
 }
 
 /// Knots of full multiplicity at which the normal turns by more than the feature angle.

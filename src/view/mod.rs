@@ -5,6 +5,7 @@ pub mod camera;
 pub mod colormap;
 pub mod deviation;
 pub mod display;
+mod facet_shading;
 pub mod feature_edges;
 pub mod histogram;
 pub mod legend;

@@ -35,11 +35,11 @@ pub struct Filter {
     pub points: bool,
     /// Free curves.
     pub free_curves: bool,
-    /// Borders of surfaces and patches.
+    /// Borders of surfaces, patches, meshes and blocks, and feature edges of meshes.
     pub borders: bool,
-    /// Iso-lines, where they are drawn.
+    /// Iso-lines and grid lines, where they are drawn.
     pub iso_lines: bool,
-    /// Surfaces of the model.
+    /// Surfaces, meshes and blocks of the model.
     pub surfaces: bool,
     /// Healed patches.
     pub patches: bool,
@@ -73,8 +73,8 @@ impl Filter {
     fn curve(&self, curve: &CurveRef) -> bool {
         match curve {
             CurveRef::Free(_) => self.free_curves,
-            CurveRef::Border(..) => self.borders,
-            CurveRef::Iso(..) => self.iso_lines,
+            CurveRef::Border(..) | CurveRef::Chain(..) => self.borders,
+            CurveRef::Iso(..) | CurveRef::GridLine(..) => self.iso_lines,
         }
     }
 
@@ -84,7 +84,7 @@ impl Filter {
 
     fn surface(&self, kind: ItemKind) -> bool {
         match kind {
-            ItemKind::Surface => self.surfaces,
+            ItemKind::Surface | ItemKind::Mesh => self.surfaces,
             ItemKind::Patch => self.patches,
             ItemKind::Curve => false,
         }
@@ -122,11 +122,11 @@ pub enum Target {
         /// Its parameter.
         t: f64,
     },
-    /// A surface or patch and the parameters on it.
+    /// A surface, patch, mesh or block and the parameters on it.
     Surface {
         /// Which one.
         entity: EntityId,
-        /// Its parameters.
+        /// Its parameters; the number of the triangle and 0 where there are no parameters.
         uv: DVec2,
     },
 }
@@ -419,10 +419,15 @@ fn surface_hit(item: &Item, ray: &Ray, view: &View, triangle: u32, barycentric: 
     let mesh = &item.display.as_ref()?.mesh;
     let corners = mesh.triangles.get(triangle as usize)?.map(|k| k as usize);
     let weights = barycentric.to_array();
-    let uv = corners.iter().zip(weights).map(|(&k, w)| mesh.uv[k] * w).sum();
     let flat = corners.iter().zip(weights).map(|(&k, w)| mesh.points[k] * w).sum();
-    let Geometry::Surface(surface) = &item.geometry else { return None };
-    let (uv, point) = on_surface(surface, ray, view, uv, flat);
+    let (uv, point) = match &item.geometry {
+        Geometry::Surface(surface) => {
+            let uv = corners.iter().zip(weights).map(|(&k, w)| mesh.uv[k] * w).sum();
+            on_surface(surface, ray, view, uv, flat)
+        }
+        Geometry::Facets(_) => (DVec2::new(f64::from(triangle), 0.0), flat),
+        Geometry::Curve(_) => return None,
+    };
     let target = Target::Surface { entity: item.id(), uv };
     Some(PickHit { target, point, distance: 0.0, depth: view.depth(point), hidden: false })
 }

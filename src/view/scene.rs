@@ -33,6 +33,8 @@ pub enum ItemKind {
     Patch,
     /// A free curve.
     Curve,
+    /// A mesh or block.
+    Mesh,
 }
 
 /// One entity, ready to be drawn and picked.
@@ -42,7 +44,7 @@ pub struct Item {
     pub entity: Arc<Entity>,
     /// What it is.
     pub kind: ItemKind,
-    /// Its number among the file's surfaces or curves; none for a patch.
+    /// Its number among the file's surfaces, curves, or meshes and blocks; none for a patch.
     pub number: Option<usize>,
     /// Its shape.
     pub geometry: Geometry,
@@ -109,7 +111,7 @@ impl Scene {
             return false;
         }
         let mut old: std::collections::HashMap<EntityId, Item> = self.items.drain(..).map(|i| (i.id(), i)).collect();
-        let mut numbers = [0, 0];
+        let mut numbers = [0; 3];
         for entity in document.entities() {
             let mut counted = |k: usize| {
                 numbers[k] += 1;
@@ -119,6 +121,7 @@ impl Scene {
                 Shape::Surface(s) => (ItemKind::Surface, counted(0), Geometry::Surface(Arc::clone(s))),
                 Shape::Patch(p) => (ItemKind::Patch, None, Geometry::Surface(Arc::clone(&p.surface))),
                 Shape::Curve(c) => (ItemKind::Curve, counted(1), Geometry::Curve(Arc::clone(c))),
+                Shape::Mesh(f) | Shape::Block(f) => (ItemKind::Mesh, counted(2), Geometry::Facets(Arc::clone(f))),
             };
             let kept = old.remove(&entity.id).filter(|item| item.geometry.same(&geometry));
             let (bounds, display, revision) = match kept {
@@ -177,10 +180,11 @@ impl Scene {
         let mut out: Vec<(f64, Request)> = Vec::new();
         for item in self.items.iter().filter(|item| item.visible()) {
             let diagonal = item.bounds.diagonal();
-            if !(diagonal > 0.0 && diagonal.is_finite()) {
-                // A shape that is a point: one display, whatever the view.
+            if item.geometry.is_fixed() || !(diagonal > 0.0 && diagonal.is_finite()) {
+                // A shape that is a point, or that is as it is: one display, whatever the view.
                 if item.display.is_none() {
-                    out.push((f64::INFINITY, self.request(item, 1.0)));
+                    let exact = FINEST * 1e-2 * if diagonal.is_finite() { diagonal } else { 1.0 };
+                    out.push((f64::INFINITY, self.request(item, exact.max(f64::MIN_POSITIVE))));
                 }
                 continue;
             }

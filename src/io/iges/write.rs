@@ -44,7 +44,13 @@ pub fn write(document: &Document, options: &IgesOptions) -> Result<(String, Save
     let mut writer = Writer::default();
     let mut saved = Saved::default();
     let mut colors: HashMap<[u32; 3], usize> = HashMap::new();
-    for entity in document.entities() {
+    let left_out = document.meshes().count();
+    if left_out > 0 {
+        let note =
+            "meshes and blocks were left out: this format holds surfaces and curves; save those as STL, OBJ or Plot3D";
+        saved.notes.push(format!("{left_out} {note}"));
+    }
+    for entity in document.entities().iter().filter(|e| e.facets().is_none()) {
         let color = entity.color.map_or(0, |color| {
             *colors.entry(color.map(f32::to_bits)).or_insert_with(|| {
                 let mut record = Record::new(314);
@@ -66,6 +72,7 @@ pub fn write(document: &Document, options: &IgesOptions) -> Result<(String, Save
             Shape::Surface(surface) => surface_record(surface),
             Shape::Patch(patch) => surface_record(&patch.surface),
             Shape::Curve(curve) => curve_record(curve),
+            Shape::Mesh(_) | Shape::Block(_) => continue,
         };
         if let Some(property) = property {
             record.integer(0);

@@ -81,6 +81,14 @@ impl ArcLength {
         t
     }
 
+    /// The length from the start up to a parameter, kept within the domain.
+    pub fn length_at(&self, curve: &Curve, t: f64) -> f64 {
+        let last = self.table.len() - 1;
+        let k = self.table.partition_point(|&(at, _)| at <= t).clamp(1, last);
+        let ((low, start), (high, end)) = (self.table[k - 1], self.table[k]);
+        if t >= high { end } else { start + integrate(curve, low, t.max(low)) }
+    }
+
     /// The point at a fraction 0..=1 of the length; the ends are the curve's own end points.
     pub fn point(&self, curve: &Curve, fraction: f64) -> DVec3 {
         curve.eval(self.parameter_at(curve, fraction * self.length()))

@@ -30,10 +30,9 @@ pub mod report;
 pub mod side;
 pub mod slab;
 
-use std::sync::Arc;
-
 use crate::kernel::geom::{Aabb, Curve, Surface};
 use crate::kernel::job::Job;
+use crate::kernel::mesh::body::Body;
 use crate::kernel::mesh::surface_set::SurfaceSet;
 
 use boundary_loop::{BoundaryLoop, LoopChoice, LoopError};
@@ -198,16 +197,16 @@ pub struct SharedBoundary {
     pub max_normal_angle_deg: f64,
 }
 
-/// Heals patches on those of the surfaces (with their numbers) that reach into their boxes of influence.
+/// Heals patches on those of the bodies (with their numbers) that reach into their boxes of influence.
 pub fn heal(
     patches: &[PatchInput],
-    surfaces: &[(usize, Arc<Surface>)],
+    bodies: &[(usize, Body)],
     options: &HealOptions,
     job: &Job,
 ) -> Result<Healed, HealError> {
     let plan = refine::plan(patches, options)?;
     job.phase("Tessellating");
-    let set = SurfaceSet::new(slab::clip(surfaces, &plan.boxes(options)), options.chord_tol, job);
+    let set = SurfaceSet::new(slab::clip(bodies, &plan.boxes(options)), options.chord_tol, job);
     refine::run(patches, &plan, &set, options, job)
 }
 

@@ -3,12 +3,11 @@
 //! The box around all a and b stands for their convex hull. Surfaces that miss it are left out before they are
 //! tessellated. Triangles need no clipping against it: the segments a-b lie inside, so a hit does too.
 
-use std::sync::Arc;
-
 use glam::DVec3;
 
 use super::grid::Grid;
-use crate::kernel::geom::{Aabb, Surface};
+use crate::kernel::geom::Aabb;
+use crate::kernel::mesh::body::Body;
 
 /// HJR99 (7): an eighth of the sum of the corner chords.
 pub fn default_distance(corners: [DVec3; 4]) -> f64 {
@@ -25,18 +24,21 @@ pub fn influence(points: &Grid<DVec3>, normals: &Grid<DVec3>, d: f64) -> Aabb {
     Aabb::of(points.values().iter().zip(normals.values()).flat_map(|(&x, &n)| segment(x, n, d)))
 }
 
-/// The surfaces whose control points reach into one of the boxes.
-pub fn clip(surfaces: &[(usize, Arc<Surface>)], boxes: &[Aabb]) -> Vec<(usize, Arc<Surface>)> {
-    let reaches = |s: &Surface| {
-        let bounds = s.bounds();
+/// The bodies whose control points or vertices reach into one of the boxes.
+pub fn clip(bodies: &[(usize, Body)], boxes: &[Aabb]) -> Vec<(usize, Body)> {
+    let reaches = |body: &Body| {
+        let bounds = body.bounds();
         boxes.iter().any(|b| b.overlaps(&bounds))
     };
-    surfaces.iter().filter(|(_, s)| reaches(s)).cloned().collect()
+    bodies.iter().filter(|(_, s)| reaches(s)).cloned().collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
+    use crate::kernel::geom::Surface;
 
     #[test]
     fn the_unit_square_has_half_a_unit_and_its_box_is_the_slab() {
@@ -48,7 +50,7 @@ mod tests {
         assert_eq!((b.min, b.max), (DVec3::new(0.0, 0.0, -0.25), DVec3::new(1.0, 1.0, 0.25)));
         let lifted = |z: f64| {
             let c = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(1.0, 1.0, 0.0)].map(|p| p + DVec3::Z * z);
-            Arc::new(Surface::bilinear(c).unwrap())
+            Body::from(Arc::new(Surface::bilinear(c).unwrap()))
         };
         let kept = clip(&[(0, lifted(0.2)), (1, lifted(0.3)), (2, lifted(-0.25))], &[b]);
         assert_eq!(kept.iter().map(|k| k.0).collect::<Vec<_>>(), [0, 2]);

@@ -26,6 +26,9 @@ pub struct GridError {
 }
 
 impl Grid {
+    /// The names of the faces of a solid block, in the order of [`Self::surfaces`].
+    pub const FACES: [&'static str; 6] = ["i min", "i max", "j min", "j max", "k min", "k max"];
+
     /// Checks and keeps a block.
     pub fn new(counts: [usize; 3], points: Vec<DVec3>, blank: Option<Vec<i32>>) -> Result<Self, GridError> {
         let expected = counts.iter().try_fold(1_usize, |n, &c| n.checked_mul(c));

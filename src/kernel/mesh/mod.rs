@@ -1,7 +1,11 @@
 //! Triangle meshes: tessellation of surfaces, a tree over triangles for rays, segments and closest points, and
 //! global projection onto sets of surfaces, which starts from it.
 
+pub mod body;
+pub mod edge_net;
+pub mod facets;
 pub mod grid;
+pub mod structured;
 pub mod surface_set;
 pub mod tessellate;
 pub mod tri_mesh;

@@ -1,10 +1,13 @@
-//! Several surfaces that are projected on together: true closest points and true segment hits (HJR99 3.3).
+//! Several bodies that are projected on together: true closest points and true segment hits (HJR99 3.3).
 //!
 //! The triangles of a tessellation find candidates, Newton on the real surfaces decides. HJR99 (8)-(9) map a hit
 //! on a triangle to (u, v) by barycentric coordinates and take s(u, v), which leaves the segment; the Newton step
 //! after it puts the point on both. A foot is global up to the tessellation: every surface point lies within the
 //! chord tolerance of its triangles, so that all triangles within the foot's distance plus that tolerance are
 //! tried. A segment that passes just beside the triangles at a border is tried on the real surfaces too.
+//!
+//! Meshes and blocks come as they are: without a parametric description the triangle hit is the condition (HJR99 3.3),
+//! so their triangles are both tree and truth, and a point's parameters are the number of its triangle and 0.
 //!
 //! Cost: a few microseconds a query. Cells cut short by the tessellation's cap weaken the guarantee;
 //! [`SurfaceSet::capped`] names them.
@@ -14,7 +17,8 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::tessellate::{TessellateOptions, tessellate};
+use super::body::Body;
+use super::tessellate::{SurfaceMesh, TessellateOptions, tessellate};
 use super::tri_tree::{Hit, Nearest, TriTree};
 use crate::kernel::geom::closest::{Closed, closed_directions, closest_from, line_from};
 use crate::kernel::geom::{Aabb, Surface};
@@ -26,12 +30,20 @@ const SAME: f64 = 1e-9;
 /// The most candidates of one query that are polished on the real surfaces.
 const CANDIDATES: usize = 64;
 
-/// Surfaces with their tessellation.
+/// What stands behind some of the triangles.
+#[derive(Clone, Debug)]
+enum Truth {
+    /// A surface, and along which parameters it is closed.
+    Surface(Arc<Surface>, Closed),
+    /// The triangles themselves.
+    Triangles,
+}
+
+/// Bodies with their triangles.
 #[derive(Clone, Debug)]
 pub struct SurfaceSet {
-    surfaces: Vec<Arc<Surface>>,
+    truths: Vec<Truth>,
     numbers: Vec<usize>,
-    closed: Vec<Closed>,
     tree: TriTree,
     /// The triangles at borders, and their numbers in `tree`.
     border: (TriTree, Vec<u32>),
@@ -79,38 +91,49 @@ pub struct Scratch {
 }
 
 impl SurfaceSet {
-    /// Tessellates the surfaces (with their numbers) to a chord tolerance. A cancelled job leaves out the rest.
-    pub fn new(surfaces: Vec<(usize, Arc<Surface>)>, chord_tol: f64, job: &Job) -> Self {
+    /// Tessellates the bodies (with their numbers) to a chord tolerance. A cancelled job leaves out the rest.
+    pub fn new<B: Into<Body>>(bodies: Vec<(usize, B)>, chord_tol: f64, job: &Job) -> Self {
+        let bodies: Vec<(usize, Body)> = bodies.into_iter().map(|(n, b)| (n, b.into())).collect();
         let options = TessellateOptions::new(chord_tol);
-        let meshes: Vec<_> = surfaces
+        let meshes: Vec<_> = bodies
             .par_iter()
-            .map(|(_, s)| (!job.is_cancelled()).then(|| (tessellate(s, &options), closed_directions(s))))
+            .map(|(_, body)| {
+                (!job.is_cancelled()).then(|| match body {
+                    Body::Surface(s) => (tessellate(s, &options), Truth::Surface(Arc::clone(s), closed_directions(s))),
+                    Body::Facets(f) => {
+                        let (points, triangles) = (f.mesh().points().to_vec(), f.mesh().triangles().to_vec());
+                        (SurfaceMesh { points, triangles, ..SurfaceMesh::default() }, Truth::Triangles)
+                    }
+                })
+            })
             .collect();
+        let parametric = bodies.iter().any(|(_, body)| matches!(body, Body::Surface(_)));
         let mut set = Self {
-            surfaces: Vec::new(),
+            truths: Vec::new(),
             numbers: Vec::new(),
-            closed: Vec::new(),
             tree: TriTree::default(),
             border: (TriTree::default(), Vec::new()),
             uv: Vec::new(),
             triangles: Vec::new(),
             first: Vec::new(),
-            chord_tol,
+            chord_tol: if parametric { chord_tol } else { 0.0 },
             diagonal: 0.0,
             capped: Vec::new(),
         };
         let mut points = Vec::new();
-        for ((number, surface), mesh) in surfaces.into_iter().zip(meshes) {
-            let Some((mesh, closed)) = mesh else { break };
+        for ((number, _), mesh) in bodies.into_iter().zip(meshes) {
+            let Some((mesh, truth)) = mesh else { break };
             let base = points.len() as u32;
             let first = set.triangles.len() as u32;
-            let [u, v] = surface.domain();
-            let at_border = |k: u32| {
-                let uv = mesh.uv[k as usize];
-                u.contains(&uv.x) || v.contains(&uv.y)
-            };
-            let on_border = mesh.triangles.iter().enumerate().filter(|(_, t)| t.iter().any(|&k| at_border(k)));
-            set.border.1.extend(on_border.map(|(k, _)| first + k as u32));
+            if let Truth::Surface(surface, _) = &truth {
+                let [u, v] = surface.domain();
+                let at_border = |k: u32| {
+                    let uv = mesh.uv[k as usize];
+                    u.contains(&uv.x) || v.contains(&uv.y)
+                };
+                let on_border = mesh.triangles.iter().enumerate().filter(|(_, t)| t.iter().any(|&k| at_border(k)));
+                set.border.1.extend(on_border.map(|(k, _)| first + k as u32));
+            }
             if mesh.capped {
                 set.capped.push(number);
             }
@@ -118,9 +141,9 @@ impl SurfaceSet {
             set.triangles.extend(mesh.triangles.iter().map(|t| t.map(|k| k + base)));
             points.extend(mesh.points);
             set.uv.extend(mesh.uv);
-            set.surfaces.push(surface);
+            set.uv.resize(points.len(), DVec2::ZERO);
+            set.truths.push(truth);
             set.numbers.push(number);
-            set.closed.push(closed);
         }
         set.diagonal = Aabb::of(points.iter().copied()).diagonal();
         let corners: Vec<DVec3> =
@@ -160,6 +183,9 @@ impl SurfaceSet {
     /// HJR99 (9): the index of the surface, and (u, v) by barycentric coordinates.
     fn place(&self, triangle: u32, barycentric: DVec3) -> (usize, DVec2) {
         let index = self.first.partition_point(|&f| f <= triangle) - 1;
+        if matches!(self.truths[index], Truth::Triangles) {
+            return (index, DVec2::new(f64::from(triangle - self.first[index]), 0.0));
+        }
         let [a, b, c] = self.triangles[triangle as usize].map(|k| self.uv[k as usize]);
         (index, a * barycentric.x + b * barycentric.y + c * barycentric.z)
     }
@@ -177,8 +203,15 @@ impl SurfaceSet {
         let nearest = self.tree.nearest(p, limit + self.chord_tol)?;
         let foot = |n: &Nearest| {
             let (index, uv) = self.place(n.triangle, n.barycentric);
-            let foot = closest_from(&self.surfaces[index], self.closed[index], p, uv);
-            (index, OnSurface { surface: self.numbers[index], uv: foot.uv, point: foot.point, distance: foot.distance })
+            let surface = self.numbers[index];
+            let found = match &self.truths[index] {
+                Truth::Surface(s, closed) => {
+                    let foot = closest_from(s, *closed, p, uv);
+                    OnSurface { surface, uv: foot.uv, point: foot.point, distance: foot.distance }
+                }
+                Truth::Triangles => OnSurface { surface, uv, point: n.point, distance: n.distance },
+            };
+            (index, found)
         };
         let (mut at, mut best) = foot(&nearest);
         self.tree.within(p, best.distance.min(nearest.distance) + self.chord_tol, &mut scratch.near);
@@ -188,7 +221,11 @@ impl SurfaceSet {
                 break;
             }
             let (index, _) = self.place(candidate.triangle, candidate.barycentric);
-            if index == at && self.beside(candidate.triangle, best.uv) {
+            let known = match self.truths[index] {
+                Truth::Surface(..) => index == at && self.beside(candidate.triangle, best.uv),
+                Truth::Triangles => candidate.distance >= best.distance,
+            };
+            if known {
                 continue;
             }
             tried += 1;
@@ -208,7 +245,13 @@ impl SurfaceSet {
         self.tree.segment_hits(a, b, &mut scratch.hits);
         for hit in &scratch.hits {
             let (index, uv) = self.place(hit.triangle, hit.barycentric);
-            self.polish(index, uv, a, b, &mut out);
+            match self.truths[index] {
+                Truth::Surface(..) => self.polish(index, uv, a, b, &mut out),
+                Truth::Triangles => {
+                    let point = a + (b - a) * hit.t;
+                    self.keep(index, SegmentHit { surface: self.numbers[index], uv, point, t: hit.t }, &mut out);
+                }
+            }
         }
         // Where a curved border reaches past its chords, the triangles miss what the surface does not.
         self.border.0.near_segment(a, b, self.chord_tol, &mut scratch.ids);
@@ -229,12 +272,17 @@ impl SurfaceSet {
 
     /// Moves a candidate onto surface and segment, and keeps it if it reaches both and is new.
     fn polish(&self, index: usize, uv: DVec2, a: DVec3, b: DVec3, out: &mut Vec<(usize, SegmentHit)>) {
-        let same = SAME * self.diagonal;
-        let foot = line_from(&self.surfaces[index], self.closed[index], a, b - a, uv);
-        if foot.residual > same || !(-1e-12..=1.0 + 1e-12).contains(&foot.t) {
+        let Truth::Surface(surface, closed) = &self.truths[index] else { return };
+        let foot = line_from(surface, *closed, a, b - a, uv);
+        if foot.residual > SAME * self.diagonal || !(-1e-12..=1.0 + 1e-12).contains(&foot.t) {
             return;
         }
-        let hit = SegmentHit { surface: self.numbers[index], uv: foot.uv, point: foot.point, t: foot.t };
+        self.keep(index, SegmentHit { surface: self.numbers[index], uv: foot.uv, point: foot.point, t: foot.t }, out);
+    }
+
+    /// Keeps a hit if it is new; of two in one point that on the body of the lower number.
+    fn keep(&self, index: usize, hit: SegmentHit, out: &mut Vec<(usize, SegmentHit)>) {
+        let same = SAME * self.diagonal;
         match out.iter_mut().find(|(_, o)| o.point.distance(hit.point) <= same) {
             Some(o) if hit.surface < o.1.surface => *o = (index, hit),
             Some(_) => {}
@@ -307,6 +355,23 @@ mod tests {
             assert_eq!(hits[1].surface, 2);
         }
         assert!(set.segment(DVec3::new(2.1, 1.0, -1.0), DVec3::new(2.1, 1.0, 3.0), &mut scratch).is_empty());
+    }
+
+    #[test]
+    fn a_mesh_is_its_own_truth_and_goes_together_with_surfaces() {
+        use crate::kernel::mesh::facets::Facets;
+        use crate::kernel::mesh::tri_mesh::TriMesh;
+        let roof = [(0.0, 0.0, 1.0), (2.0, 0.0, 1.0), (2.0, 2.0, 1.0), (0.0, 2.0, 2.0)].map(DVec3::from);
+        let mesh = TriMesh::new(roof.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+        let floor = graph(|_, _| 0.0, 1, DVec2::ZERO, DVec2::splat(2.0));
+        let bodies = vec![(0, Body::from(floor)), (1, Body::from(Arc::new(Facets::of_mesh(mesh))))];
+        let set = SurfaceSet::new(bodies, 1e-3, &Job::new());
+        let mut scratch = Scratch::default();
+        let hits = set.segment(DVec3::new(0.5, 0.5, -1.0), DVec3::new(0.5, 0.5, 3.0), &mut scratch);
+        assert_eq!(hits.iter().map(|h| (h.surface, h.point.z)).collect::<Vec<_>>(), [(0, 0.0), (1, 1.0)]);
+        let foot = set.closest(DVec3::new(1.5, 0.5, 0.8), 9.0, &mut scratch).unwrap();
+        assert_eq!((foot.surface, foot.point, foot.uv), (1, DVec3::new(1.5, 0.5, 1.0), DVec2::ZERO));
+        assert_eq!(set.closest(DVec3::new(1.5, 0.5, 0.3), 9.0, &mut scratch).unwrap().surface, 0);
     }
 
     #[test]

@@ -5,6 +5,8 @@ use std::ops::Range;
 
 use glam::DVec3;
 
+use crate::kernel::geom::Aabb;
+
 /// A named run of triangles (an STL solid, an OBJ group).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Group {
@@ -99,6 +101,52 @@ impl TriMesh {
             }
         }
         Ok(Self { points, triangles, groups: Vec::new() })
+    }
+
+    /// Names runs of triangles (name, first, one past the last); runs that are out of order or range are left out.
+    pub fn set_groups(&mut self, groups: Vec<(String, usize, usize)>) {
+        self.groups.clear();
+        for (name, start, end) in groups {
+            let behind = self.groups.last().map_or(0, |g| g.triangles.end);
+            if behind <= start && start <= end && end <= self.triangles.len() {
+                self.groups.push(Group { name, triangles: start..end });
+            }
+        }
+    }
+
+    /// A box around the vertices.
+    pub fn bounds(&self) -> Aabb {
+        Aabb::of(self.points.iter().copied())
+    }
+
+    /// The groups as meshes of their own, each with its vertices in the order in which its triangles use them; the
+    /// mesh itself when it has no more than one.
+    pub fn into_parts(self) -> Vec<(String, Self)> {
+        if self.groups.len() < 2 {
+            let name = self.groups.first().map(|g| g.name.clone()).unwrap_or_default();
+            return vec![(name, self)];
+        }
+        let mut renamed = vec![u32::MAX; self.points.len()];
+        let mut parts = Vec::with_capacity(self.groups.len());
+        for group in &self.groups {
+            let (mut points, mut used) = (Vec::new(), Vec::new());
+            let mut triangles = Vec::with_capacity(group.triangles.len());
+            for corners in &self.triangles[group.triangles.clone()] {
+                triangles.push(corners.map(|k| {
+                    let own = &mut renamed[k as usize];
+                    if *own == u32::MAX {
+                        *own = points.len() as u32;
+                        points.push(self.points[k as usize]);
+                        used.push(k);
+                    }
+                    *own
+                }));
+            }
+            used.into_iter().for_each(|k| renamed[k as usize] = u32::MAX);
+            let groups = vec![Group { name: group.name.clone(), triangles: 0..triangles.len() }];
+            parts.push((group.name.clone(), Self { points, triangles, groups }));
+        }
+        parts
     }
 
     /// The vertices.

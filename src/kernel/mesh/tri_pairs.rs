@@ -21,6 +21,11 @@ impl TriTree {
     /// The callers' numbers of all pairs (own, other) of triangles whose boxes overlap, in a fixed order. What
     /// has been found so far when the job is cancelled.
     pub fn overlapping_pairs(&self, other: &Self, job: &Job) -> Vec<[u32; 2]> {
+        self.pairs_within(other, 0.0, job)
+    }
+
+    /// The same for boxes that are at most `margin` apart along every axis.
+    pub fn pairs_within(&self, other: &Self, margin: f64, job: &Job) -> Vec<[u32; 2]> {
         let mut pairs = Vec::new();
         if self.is_empty() || other.is_empty() {
             return pairs;
@@ -34,13 +39,14 @@ impl TriTree {
                 break;
             }
             let (na, nb) = (&self.nodes[a as usize], &other.nodes[b as usize]);
-            if !overlap(na, nb, offset) {
+            if !overlap(na, nb, offset, margin) {
                 continue;
             }
             match (na.count > 0, nb.count > 0) {
                 (true, true) => {
                     for i in range(na) {
                         let (low, high) = extent(self.corners(i));
+                        let (low, high) = (low - margin, high + margin);
                         for j in range(nb) {
                             let (other_low, other_high) = extent(other.corners(j));
                             if low.cmple(other_high).all() && other_low.cmple(high).all() {
@@ -72,9 +78,10 @@ fn size(node: &Node) -> f32 {
 }
 
 /// Boxes are grown by more than the rounding of this comparison when they are made.
-fn overlap(a: &Node, b: &Node, offset: DVec3) -> bool {
+fn overlap(a: &Node, b: &Node, offset: DVec3, margin: f64) -> bool {
     (0..3).all(|k| {
-        f64::from(a.min[k]) <= f64::from(b.max[k]) + offset[k] && f64::from(b.min[k]) + offset[k] <= f64::from(a.max[k])
+        f64::from(a.min[k]) <= f64::from(b.max[k]) + offset[k] + margin
+            && f64::from(b.min[k]) + offset[k] <= f64::from(a.max[k]) + margin
     })
 }
 

@@ -1,27 +1,35 @@
 //! The whole of HJR99 section 4: triangulate, intersect the trees, trace, refine on the parametric sides, insert
 //! and delete points to meet the tolerance. The answer has the form of the hybrid engine's.
 //!
-//! What the paper calls a solution of a few seconds carries two reservations that the answer states: branches
-//! that the triangulations miss (loops smaller than their triangles) are not found, which is why the chord
-//! tolerance is part of the options, and points at which the normals are nearly parallel are not refined but
-//! listed as unresolved, for the collinear-normal machinery of the hybrid engine. `error_bound` is measured at
-//! the middle of every chord, on both sides.
+//! A pair of surfaces that come near with agreeing normals (see [`super::near`]), or of which a point cannot be refined
+//! because they do, is handed over to the hybrid engine as a whole, with a warning that says so: there the triangles
+//! decide nothing. On the other pairs of surfaces the topology is that of the triangles. A mesh or block is its own truth:
+//! against one, a point is refined on the surface's side only, along the edge of the mesh on which it lies or in the
+//! plane of the triangle. `error_bound` is measured at the middle of every chord, on both sides.
+//!
+//! Branches of three different bodies meet in points (HJR99 4): see [`super::triple`].
 
 use std::time::Instant;
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 use super::join::join;
+use super::near::near_agreement;
 use super::refine::{Refined, Sheet as Touch, TANGENTIAL, refine};
-use super::sheet::{Body, Sheet};
+use super::sheet::Sheet;
 use super::topology::{Mesh, Point};
 use super::trace::Chain;
+use super::triple;
 use super::{MeshIntersection, intersect};
 use crate::kernel::geom::Aabb;
+use crate::kernel::geom::closest::{closed_directions, line_from};
 use crate::kernel::job::Job;
+use crate::kernel::mesh::body::Body;
 use crate::kernel::ssi::result::{
     Counts, CurveEnd, CurveKind, CurvePoint, Intersection, IntersectionCurve, Times, Unresolved,
 };
+use crate::kernel::ssi::{self, SsiOptions};
 
 /// What the ends of two curves on a common border may be apart, as a fraction of the diagonal.
 const JOINING: f64 = 1e-9;
@@ -84,10 +92,7 @@ pub fn intersect_bodies(
             return Err(MeshSsiError::Empty { side });
         }
     }
-    let bounds = a.iter().chain(b).fold(Aabb::EMPTY, |all, (_, body)| match body {
-        Body::Surface(s) => all.union(&s.bounds()),
-        Body::Mesh(m) => all.union(&Aabb::of(m.points().iter().copied())),
-    });
+    let bounds = a.iter().chain(b).fold(Aabb::EMPTY, |all, (_, body)| all.union(&body.bounds()));
     let diagonal = bounds.diagonal();
     let (tol, chord_tol) = (options.tol.unwrap_or(1e-6 * diagonal), options.chord_tol.unwrap_or(1e-4 * diagonal));
     for (what, value) in [("tolerance", tol), ("chord tolerance", chord_tol)] {
@@ -98,7 +103,7 @@ pub fn intersect_bodies(
     let start = Instant::now();
     job.phase("Triangulating");
     let sheets = |bodies: &[(usize, Body)]| -> Vec<(usize, Sheet)> {
-        bodies.iter().map(|(number, body)| (*number, Sheet::new(body, chord_tol))).collect()
+        bodies.par_iter().map(|(number, body)| (*number, Sheet::new(body, chord_tol))).collect()
     };
     let (left, right) = (sheets(a), sheets(b));
     let mut out = Intersection { tol, complete: true, ..Intersection::default() };
@@ -116,6 +121,12 @@ pub fn intersect_bodies(
             break;
         }
         let start = Instant::now();
+        if let Some([ta, _]) = near_agreement(sa, sb, 2.0 * chord_tol, job) {
+            let at = sa.plane(ta).0;
+            hand_over([(*na, sa), (*nb, sb)], tol, &format!("come near with agreeing normals at {at}"), &mut out, job);
+            times.curves += start.elapsed().as_secs_f64() * 1e3;
+            continue;
+        }
         let found = intersect(sa.triangles(), sa.tree(), sb.triangles(), sb.tree(), job);
         times.traverse += start.elapsed().as_secs_f64() * 1e3;
         out.complete &= found.complete;
@@ -128,16 +139,45 @@ pub fn intersect_bodies(
             floor: 1e-14 * (diagonal + bounds.max_abs()),
             max_inserted: options.max_inserted,
         };
+        let before = (out.curves.len(), out.unresolved.len());
         for chain in &found.chains {
             pair.finish(&found, chain, &mut out);
+        }
+        if let Some(place) = out.unresolved.get(before.1).filter(|_| sa.surface().is_some() && sb.surface().is_some()) {
+            let why = format!("have a point that cannot be refined ({})", place.reason);
+            out.curves.truncate(before.0);
+            out.unresolved.truncate(before.1);
+            hand_over([(*na, sa), (*nb, sb)], tol, &why, &mut out, job);
         }
         times.curves += start.elapsed().as_secs_f64() * 1e3;
     }
     out.curves = join(std::mem::take(&mut out.curves), JOINING * diagonal);
+    let all: Vec<(usize, &Sheet)> = left.iter().chain(&right).map(|(n, s)| (*n, s)).collect();
+    out.junctions.extend(triple::points(&out.curves, &all, JOINING * diagonal, job));
     out.complete &= out.unresolved.is_empty();
     out.counts = Counts { nodes_built: left.iter().chain(&right).map(|(_, s)| s.tree().len()).sum(), ..out.counts };
     out.time_ms = times;
     Ok(out)
+}
+
+/// Lets the hybrid engine intersect a pair of surfaces, and adds what it finds.
+fn hand_over(pair: [(usize, &Sheet); 2], tol: f64, why: &str, out: &mut Intersection, job: &Job) {
+    let [(na, sa), (nb, sb)] = pair;
+    let (Some(a), Some(b)) = (sa.surface(), sb.surface()) else { return };
+    job.warn(format!("surfaces {na} and {nb} {why}: handed over to the hybrid engine"));
+    let options = SsiOptions { tol: Some(tol), ..SsiOptions::default() };
+    match ssi::intersect(&[(na, a.as_ref())], &[(nb, b.as_ref())], &options, job) {
+        Ok(found) => out.append(found),
+        Err(error) => {
+            out.unresolved.push(Unresolved {
+                a: na,
+                uv_box: a.domain(),
+                b: nb,
+                st_box: b.domain(),
+                reason: format!("the hybrid engine says: {error}"),
+            });
+        }
+    }
 }
 
 impl Pair<'_> {
@@ -154,7 +194,7 @@ impl Pair<'_> {
             let segment = found.topology.segments[chain.segments[k.min(chain.segments.len() - 1)] as usize];
             let start = self.start(point, segment.triangles);
             let fixed = (point.uses.len() == 1).then(|| self.border(point)).flatten();
-            match self.refined(start, segment.triangles, fixed) {
+            match self.at_point(start, point, segment.triangles, fixed) {
                 Ok(refined) => points.push(refined),
                 Err(reason) => {
                     failed.get_or_insert((start, reason));
@@ -162,8 +202,9 @@ impl Pair<'_> {
                 }
             }
         }
-        let triangles = found.topology.segments[chain.segments[0] as usize].triangles;
-        let (points, error_bound) = self.adapted(points, triangles, chain.closed);
+        let triangles: Vec<[u32; 2]> =
+            chain.segments.iter().map(|&s| found.topology.segments[s as usize].triangles).collect();
+        let (points, error_bound) = self.adapted(points, &triangles, chain.closed);
         let end = |at: u32| match found.topology.points[at as usize].uses.len() {
             1 => CurveEnd::Boundary,
             _ => CurveEnd::Junction,
@@ -173,6 +214,10 @@ impl Pair<'_> {
         } else {
             [end(chain.points[0]), end(chain.points[chain.points.len() - 1])]
         };
+        if failed.is_none() && error_bound > self.tol {
+            let reason = format!("{} points were inserted and {error_bound:.3e} is left", self.max_inserted);
+            failed = points.first().map(|p| (*p, reason));
+        }
         if let Some((at, reason)) = failed {
             out.unresolved.push(Unresolved {
                 a: at.a,
@@ -213,6 +258,30 @@ impl Pair<'_> {
         let domain = sheet.surface()?.domain();
         let uv = point.key.edge.map(|k| sheet.uv_of(k));
         (0..2).find(|&d| uv[0][d] == uv[1][d] && domain[d].contains(&uv[0][d])).map(|d| (side, d))
+    }
+
+    /// The point of both sheets next to a point of the triangulations. One that lies on an edge of a mesh stays on it.
+    fn at_point(
+        &self,
+        start: CurvePoint,
+        point: &Point,
+        triangles: [u32; 2],
+        fixed: Option<(usize, usize)>,
+    ) -> Result<CurvePoint, String> {
+        let side = usize::from(point.key.edge_of == Mesh::B);
+        let (own, other) = (self.sheets[side], self.sheets[1 - side]);
+        if let (None, Some(surface)) = (own.surface(), other.surface()) {
+            let [p, q] = own.edge(point.key.edge);
+            let uv = if side == 0 { start.st } else { start.uv };
+            let foot = line_from(surface, closed_directions(surface), p, q - p, uv);
+            // An edge that only the triangles meet is left to the planes.
+            if foot.residual <= self.floor.max(1e-3 * self.tol) && (-1e-9..=1.0 + 1e-9).contains(&foot.t) {
+                let mut at = CurvePoint { xyz: foot.point, ..start };
+                *(if side == 0 { &mut at.st } else { &mut at.uv }) = foot.uv;
+                return Ok(at);
+            }
+        }
+        self.refined(start, triangles, fixed)
     }
 
     /// The point of both sheets next to `start`.
@@ -258,25 +327,26 @@ impl Pair<'_> {
     }
 
     /// Inserts points where the middle of a chord is off by more than the tolerance, then drops points that are
-    /// not needed. Returns the points and the largest distance left, measured at chord middles.
-    fn adapted(&self, points: Vec<CurvePoint>, triangles: [u32; 2], closed: bool) -> (Vec<CurvePoint>, f64) {
-        let parametric = self.sheets.iter().all(|s| s.surface().is_some());
-        if !parametric {
-            return (points, 0.0);
+    /// not needed. `triangles`: those of each chord. Returns the points and a bound of the distance of the polyline,
+    /// from what is measured at chord middles.
+    fn adapted(&self, points: Vec<CurvePoint>, triangles: &[[u32; 2]], closed: bool) -> (Vec<CurvePoint>, f64) {
+        if self.sheets.iter().all(|s| s.surface().is_none()) {
+            // The segments of two meshes are the truth.
+            return (points, self.floor);
         }
-        let middle = |p: &CurvePoint, q: &CurvePoint| {
+        let middle = |p: &CurvePoint, q: &CurvePoint, triangles: [u32; 2]| {
             let start =
                 CurvePoint { xyz: 0.5 * (p.xyz + q.xyz), uv: 0.5 * (p.uv + q.uv), st: 0.5 * (p.st + q.st), ..*p };
             self.refined(start, triangles, None).ok().map(|m| (m, distance_to_chord(m.xyz, p.xyz, q.xyz)))
         };
         let mut dense = vec![points[0]];
         let mut worst = 0.0_f64;
-        for pair in points.windows(2) {
+        for (pair, &triangles) in points.windows(2).zip(triangles) {
             let mut stack = vec![pair[1]];
             let mut inserted = 0;
             while let (Some(&from), Some(&to)) = (dense.last(), stack.last()) {
-                match middle(&from, &to) {
-                    Some((m, off)) if off > 0.5 * self.tol && inserted < self.max_inserted => {
+                match middle(&from, &to, triangles) {
+                    Some((m, off)) if off > 0.25 * self.tol && inserted < self.max_inserted => {
                         inserted += 1;
                         stack.push(m);
                     }
@@ -289,6 +359,7 @@ impl Pair<'_> {
             }
         }
         let mut kept = vec![dense[0]];
+        let mut dropped = 0.0_f64;
         let mut at = 0;
         while at + 1 < dense.len() {
             let mut next = at + 1;
@@ -301,13 +372,13 @@ impl Pair<'_> {
                 if off > 0.25 * self.tol {
                     break;
                 }
-                worst = worst.max(off);
+                dropped = dropped.max(off);
                 next += 1;
             }
             kept.push(dense[next]);
             at = next;
         }
-        (kept, 2.0 * worst + self.floor)
+        (kept, 1.5 * worst + dropped + self.floor)
     }
 }
 

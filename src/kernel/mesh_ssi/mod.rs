@@ -4,11 +4,13 @@
 pub mod border;
 pub mod engine;
 pub mod join;
+pub mod near;
 pub mod perturbed;
 pub mod refine;
 pub mod sheet;
 pub mod topology;
 pub mod trace;
+pub mod triple;
 
 use glam::DVec3;
 

@@ -98,6 +98,8 @@ pub enum JunctionKind {
     NearMiss,
     /// Another number of branches meet.
     HigherOrder,
+    /// Branches of three bodies cross; the surfaces do not touch here.
+    ThreeSurfaces,
 }
 
 /// A point in which the surfaces touch.
@@ -201,6 +203,31 @@ pub struct Intersection {
     pub counts: Counts,
     /// How long it took.
     pub time_ms: Times,
+}
+
+impl Intersection {
+    /// Adds another answer to this one; its numbers of junctions, miter points and regions move up.
+    pub fn append(&mut self, other: Self) {
+        let (junctions, miters, regions) = (self.junctions.len(), self.miters.len(), self.regions.len());
+        self.complete &= other.complete;
+        self.curves.extend(other.curves.into_iter().map(|mut curve| {
+            for (end, id) in curve.ends.iter().zip(&mut curve.end_ids) {
+                let shift = if *end == CurveEnd::Miter { miters } else { junctions };
+                *id = id.map(|k| k + shift);
+            }
+            curve.region = curve.region.map(|k| k + regions);
+            curve
+        }));
+        self.junctions.extend(other.junctions);
+        self.miters.extend(other.miters);
+        self.regions.extend(other.regions);
+        self.unresolved.extend(other.unresolved);
+        self.counts.leaf_pairs += other.counts.leaf_pairs;
+        self.counts.nodes_built += other.counts.nodes_built;
+        self.time_ms.build += other.time_ms.build;
+        self.time_ms.traverse += other.time_ms.traverse;
+        self.time_ms.curves += other.time_ms.curves;
+    }
 }
 
 #[cfg(test)]

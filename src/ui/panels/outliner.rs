@@ -72,6 +72,8 @@ fn row(ui: &mut Ui, editor: &mut Editor, entity: &Entity, shown: &[&std::sync::A
         Shape::Surface(_) => Icon::Surface,
         Shape::Curve(_) => Icon::Curve,
         Shape::Patch(_) => Icon::Patch,
+        Shape::Mesh(_) => Icon::Mesh,
+        Shape::Block(_) => Icon::Block,
     };
     let square = |x: f32| egui::Rect::from_min_size(egui::pos2(x, rect.top() + 4.0), vec2(14.0, 14.0));
     let icon_color = if matches!(entity.shape, Shape::Patch(_)) { t.accent } else { t.text[1] };

@@ -6,6 +6,7 @@ use super::super::actions::Action;
 use super::super::editor::Editor;
 use super::super::status::{length, short};
 use crate::kernel::geom::{Aabb, Curve, Surface};
+use crate::kernel::mesh::facets::Facets;
 use crate::model::command::Command;
 use crate::model::document::{Entity, Shape, Unit};
 
@@ -68,6 +69,9 @@ fn model(ui: &mut Ui, editor: &mut Editor) {
         super::property(ui, "Surfaces", document.surfaces().count().to_string());
         super::property(ui, "Curves", document.curves().count().to_string());
         super::property(ui, "Patches", document.patches().count().to_string());
+        if document.meshes().next().is_some() {
+            super::property(ui, "Meshes and blocks", document.meshes().count().to_string());
+        }
         size(ui, &document.bounds(), document.unit);
         ui.label(egui::RichText::new("Unit").color(super::super::theme::of(ui).text[1]));
         let name = |unit: Unit| if unit == Unit::Unknown { "none" } else { unit.symbol() };
@@ -98,6 +102,13 @@ fn one(ui: &mut Ui, editor: &mut Editor, entity: &Entity, unit: Unit) {
             Shape::Curve(c) => {
                 super::property(ui, "Kind", "Curve");
                 curve(ui, c);
+            }
+            Shape::Mesh(f) | Shape::Block(f) => {
+                super::property(ui, "Kind", if f.grid().is_some() { "Structured block" } else { "Triangle mesh" });
+                if let Some(number) = editor.document().meshes().position(|(id, _)| id == entity.id) {
+                    super::property(ui, "Number", number.to_string());
+                }
+                facets(ui, f);
             }
             Shape::Patch(patch) => {
                 super::property(ui, "Kind", "Healed patch");
@@ -136,6 +147,16 @@ fn surface(ui: &mut Ui, s: &Surface) {
     super::property(ui, "u", format!("{} to {}", short(u0), short(u1)));
     super::property(ui, "v", format!("{} to {}", short(v0), short(v1)));
     super::property(ui, "Weights", if s.weights().is_some() { "rational" } else { "all 1" });
+}
+
+fn facets(ui: &mut Ui, f: &Facets) {
+    if let Some(grid) = f.grid() {
+        super::property(ui, "Points", grid.counts().map(|c| c.to_string()).join(" x "));
+        super::property(ui, "Blanking", if grid.blank().is_some() { "IBLANK" } else { "none" });
+    }
+    super::property(ui, "Triangles", f.mesh().triangles().len().to_string());
+    super::property(ui, "Vertices", f.mesh().points().len().to_string());
+    super::property(ui, "Pickable curves", f.curves().len().to_string());
 }
 
 fn curve(ui: &mut Ui, c: &Curve) {

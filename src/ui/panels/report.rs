@@ -20,6 +20,9 @@ pub fn show(ui: &mut Ui, editor: &mut Editor) {
     Grid::new("report totals").num_columns(2).spacing(vec2(14.0, 4.0)).show(ui, |ui| {
         super::property(ui, "Surfaces read", report.surfaces.to_string());
         super::property(ui, "Curves read", report.curves.to_string());
+        if report.meshes > 0 {
+            super::property(ui, "Meshes and blocks read", report.meshes.to_string());
+        }
         super::property(ui, "Skipped", report.count(Severity::Skipped).to_string());
         super::property(ui, "Warnings", report.count(Severity::Warning).to_string());
     });

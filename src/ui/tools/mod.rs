@@ -213,7 +213,7 @@ impl Editor {
                     out.push(CurveHint {
                         entity: item.id().0,
                         name: item.entity.name.clone(),
-                        curve: curve_name(&curve.curve),
+                        curve: curve_name(&item.entity, &curve.curve),
                         at: [at.x * scale, at.y * scale],
                     });
                 }

@@ -8,10 +8,10 @@ use glam::{DVec2, DVec3};
 use super::super::editor::{Editor, Page};
 use super::super::viewport::Pointer;
 use super::Tool;
-use crate::kernel::geom::Surface;
 use crate::kernel::heal::preview::{Preview, PreviewOptions, preview};
 use crate::kernel::heal::project::Status;
 use crate::kernel::job::Job;
+use crate::kernel::mesh::body::Body;
 use crate::kernel::mesh::surface_set::SurfaceSet;
 use crate::kernel::mesh::tessellate::{SurfaceMesh, tessellate_on};
 use crate::model::command::Command;
@@ -316,7 +316,7 @@ fn written(spec: &HealSpec) -> String {
 fn originals_of(
     kept: &Originals,
     onto: Option<&Vec<usize>>,
-    surfaces: &[(usize, Arc<Surface>)],
+    surfaces: &[(usize, Body)],
     tol: f64,
     job: &Job,
 ) -> Arc<SurfaceSet> {

@@ -8,6 +8,7 @@ use super::super::actions::{self, Action};
 use super::super::editor::Editor;
 use super::super::{paint, theme};
 use super::{Pointer, gizmo, hit_entity};
+use crate::model::document::Entity;
 use crate::view::display::CurveRef;
 use crate::view::pick::{PickHit, Target};
 
@@ -100,7 +101,10 @@ impl Editor {
         match &hit.target {
             Target::Surface { entity, .. } => name(*entity),
             Target::Curve { curve: CurveRef::Free(id), .. } => name(*id),
-            Target::Curve { curve, .. } => Some(format!("{} · {}", name(curve.entity())?, curve_name(curve))),
+            Target::Curve { curve, .. } => {
+                let entity = self.document().get(curve.entity())?;
+                Some(format!("{} · {}", entity.name, curve_name(entity, curve)))
+            }
             Target::Point(_) => None,
         }
     }
@@ -135,11 +139,15 @@ impl Editor {
     }
 }
 
-/// What a curve of a surface is called.
-pub fn curve_name(curve: &CurveRef) -> String {
+/// What a curve of an entity is called.
+pub fn curve_name(entity: &Entity, curve: &CurveRef) -> String {
     use crate::kernel::geom::{Direction, Side};
     match curve {
         CurveRef::Free(_) => "curve".to_owned(),
+        CurveRef::Chain(_, k) | CurveRef::GridLine(_, k) => {
+            let chain = entity.facets().and_then(|f| f.curves().get(*k as usize));
+            chain.map_or_else(|| format!("curve {k}"), |c| c.name.clone())
+        }
         CurveRef::Border(_, Side::UMin) => "border u min".to_owned(),
         CurveRef::Border(_, Side::UMax) => "border u max".to_owned(),
         CurveRef::Border(_, Side::VMin) => "border v min".to_owned(),

@@ -141,7 +141,7 @@ impl PatchTool {
             let Some(display) = &item.display else { continue };
             for curve in &display.curves {
                 let ends = [curve.points[0], curve.points[curve.points.len() - 1]];
-                if matches!(curve.curve, CurveRef::Iso(..)) || used(&curve.curve) || !ends.iter().any(|p| near(*p)) {
+                if curve.curve.is_iso() || used(&curve.curve) || !ends.iter().any(|p| near(*p)) {
                     continue;
                 }
                 let n = curve.points.len() - 1;

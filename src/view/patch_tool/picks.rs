@@ -72,6 +72,12 @@ impl PatchTool {
             }
             return;
         }
+        if scene.item(entity).is_some_and(|item| item.kind == ItemKind::Mesh) {
+            self.refuse(
+                "A mesh has no iso-curves; click one of its borders, feature edges or grid lines, or draw with D",
+            );
+            return;
+        }
         self.mode = Mode::Iso { entity, uv, fixed: Direction::U };
     }
 

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use crate::kernel::geom::arc_length::ArcLength;
 use crate::kernel::geom::{Curve, Direction, Side};
+use crate::kernel::mesh::facets::FacetCurveKind;
 use crate::model::spec::{IsoAt, Piece};
 use crate::view::display::CurveRef;
 use crate::view::scene::{Item, ItemKind, Scene};
@@ -58,7 +59,7 @@ pub enum PieceError {
     /// A specification names something that is not there.
     #[error("{what} {number} is not in this document")]
     Missing {
-        /// "surface" or "curve".
+        /// "surface", "curve", "mesh" or "chain".
         what: &'static str,
         /// Its number.
         number: usize,
@@ -160,6 +161,14 @@ impl Picked {
                 let item = found.ok_or(PieceError::Missing { what: "curve", number: *id })?;
                 by_fractions(CurveRef::Free(item.id()), item, *from, *to)
             }
+            Piece::Chain { mesh, chain, from, to } => {
+                let found = scene.items().iter().find(|i| i.kind == ItemKind::Mesh && i.number == Some(*mesh));
+                let item = found.ok_or(PieceError::Missing { what: "mesh", number: *mesh })?;
+                let kind = item.entity.facets().and_then(|f| f.curves().get(*chain)).map(|c| c.kind);
+                let kind = kind.ok_or(PieceError::Missing { what: "chain", number: *chain })?;
+                let name = if kind == FacetCurveKind::GridLine { CurveRef::GridLine } else { CurveRef::Chain };
+                by_fractions(name(item.id(), *chain as u32), item, *from, *to)
+            }
             Piece::Line(a, b) => Self::line(point(a), point(b)),
             Piece::Polyline(points) => Self::polyline(&points.iter().map(point).collect::<Vec<_>>()),
             Piece::Drawn(points) => Self::drawn(scene, &points.iter().map(point).collect::<Vec<_>>()),
@@ -196,6 +205,10 @@ impl Picked {
                     CurveRef::Border(_, side) => {
                         let [from, to] = turned(fractions(item, curve, *range)?);
                         Ok(Piece::Edge { face: number, ring: 0, edge: side as usize, from, to })
+                    }
+                    CurveRef::Chain(_, chain) | CurveRef::GridLine(_, chain) => {
+                        let [from, to] = turned(fractions(item, curve, *range)?);
+                        Ok(Piece::Chain { mesh: number, chain: chain as usize, from, to })
                     }
                     CurveRef::Free(_) => {
                         let [from, to] = turned(fractions(item, curve, *range)?);

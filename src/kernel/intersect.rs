@@ -1,0 +1,77 @@
+//! The two intersection engines behind one door: the same bodies in, the same [`Intersection`] out, so that both
+//! results can be laid over one another.
+//!
+//! [`Engine::Bvh`] works on the exact surfaces and certifies that no branch is missing (thesis chapter 5); it needs
+//! parametric bodies. [`Engine::Mesh`] works on triangulations (HJR99 section 4); it takes meshes and blocks too.
+
+use std::sync::Arc;
+
+use super::geom::Surface;
+use super::job::Job;
+use super::mesh::body::Body;
+use super::mesh_ssi::engine::{MeshSsiError, MeshSsiOptions, intersect_bodies};
+use super::ssi::{Intersection, SsiError, SsiOptions};
+
+/// Which engine.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Engine {
+    /// Exact surfaces, with a certificate.
+    #[default]
+    Bvh,
+    /// Triangulations.
+    Mesh,
+}
+
+impl Engine {
+    /// The engine that can take these bodies: triangulations where one of them is a mesh or block.
+    pub fn for_bodies<'a>(bodies: impl IntoIterator<Item = &'a Body>) -> Self {
+        if bodies.into_iter().any(|b| matches!(b, Body::Facets(_))) { Self::Mesh } else { Self::Bvh }
+    }
+}
+
+/// Why bodies were not intersected.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum IntersectError {
+    /// The exact engine could not start.
+    #[error(transparent)]
+    Bvh(#[from] SsiError),
+    /// The triangulation engine could not start.
+    #[error(transparent)]
+    Mesh(#[from] MeshSsiError),
+    /// The exact engine was given triangles.
+    #[error("body {number} is a mesh or block without a parametric description; use the mesh engine")]
+    NotParametric {
+        /// Its number.
+        number: usize,
+    },
+}
+
+/// Intersects all bodies of one side with all of the other, each with its number. `tol`: how closely curves follow, in
+/// model units, 1e-6 of the diagonal when left out.
+pub fn intersect_with(
+    engine: Engine,
+    a: &[(usize, Body)],
+    b: &[(usize, Body)],
+    tol: Option<f64>,
+    job: &Job,
+) -> Result<Intersection, IntersectError> {
+    match engine {
+        Engine::Bvh => {
+            let (a, b) = (parametric(a)?, parametric(b)?);
+            Ok(super::ssi::intersect(&borrowed(&a), &borrowed(&b), &SsiOptions { tol, ..SsiOptions::default() }, job)?)
+        }
+        Engine::Mesh => Ok(intersect_bodies(a, b, &MeshSsiOptions { tol, ..MeshSsiOptions::default() }, job)?),
+    }
+}
+
+fn parametric(bodies: &[(usize, Body)]) -> Result<Vec<(usize, Arc<Surface>)>, IntersectError> {
+    let one = |(number, body): &(usize, Body)| match body {
+        Body::Surface(surface) => Ok((*number, Arc::clone(surface))),
+        Body::Facets(_) => Err(IntersectError::NotParametric { number: *number }),
+    };
+    bodies.iter().map(one).collect()
+}
+
+fn borrowed(surfaces: &[(usize, Arc<Surface>)]) -> Vec<(usize, &Surface)> {
+    surfaces.iter().map(|(n, s)| (*n, s.as_ref())).collect()
+}
