@@ -199,6 +199,43 @@ fn a_click_selects_hiding_hides_and_undo_shows_again() {
     assert_eq!(visible(&window), 2);
 }
 
+fn hover(window: &mut Window, at: Pos2) {
+    window.event(Event::PointerMoved(at));
+    window.step();
+    settle(window);
+}
+
+#[test]
+fn the_uv_view_and_the_3d_view_share_one_cursor() {
+    let mut window = opened("surfaces_with_gap.igs");
+    window.get_by_label("left panel").click();
+    settle(&mut window);
+    key(&mut window, Modifiers::NONE, Key::U);
+    assert!(window.state().editor.settings.uv_view);
+    let pane = window.get_by_label("uv view of left panel").rect();
+    hover(&mut window, pane.center());
+    let (entity, surface) = window.state().editor.document().surfaces().next().map(|(e, s)| (e, s.clone())).unwrap();
+    let [u, v] = surface.domain();
+    let middle = glam::DVec2::new(0.5 * (u[0] + u[1]), 0.5 * (v[0] + v[1]));
+    let linked = window.state().editor.linked.unwrap();
+    assert_eq!(linked.entity, entity);
+    // The middle of the pane is the middle of the domain.
+    assert!(linked.uv.distance(middle) < 1e-3 * (u[1] - u[0] + v[1] - v[0]), "{}", linked.uv);
+    picture(&mut window, "uv_from_domain");
+    // The same point in the 3D view gives the same parameters back.
+    let at = window.state().editor.viewport.project(surface.eval(linked.uv)).unwrap();
+    hover(&mut window, at);
+    let back = window.state().editor.linked.unwrap();
+    assert_eq!(back.entity, entity);
+    assert!(back.uv.distance(linked.uv) < 0.02 * (u[1] - u[0] + v[1] - v[0]), "{} {}", back.uv, linked.uv);
+    picture(&mut window, "uv_from_space");
+    // Over neither view there is no cursor.
+    hover(&mut window, pos2(4.0, 4.0));
+    assert!(window.state().editor.linked.is_none());
+    key(&mut window, Modifiers::NONE, Key::U);
+    assert!(window.query_by_label("uv view of left panel").is_none());
+}
+
 #[test]
 fn a_file_that_cannot_be_read_is_explained_and_the_model_stays() {
     let folder = tempfile::tempdir().unwrap();

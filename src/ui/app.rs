@@ -13,6 +13,7 @@ use super::editor::{Editor, Page};
 use super::files::Files;
 use super::hints::{self, Hints};
 use super::palette;
+use super::panels::uv::{self, UvView};
 use super::settings::Settings;
 use super::tools::Tool;
 use super::viewport::Viewport;
@@ -97,6 +98,8 @@ impl App {
             checking: None,
             may_close: false,
             recoveries: Vec::new(),
+            uv: UvView::default(),
+            linked: None,
             autosave: options.journal.as_ref().map(Autosave::start).unwrap_or_default(),
         };
         editor.apply_settings(ctx);
@@ -259,6 +262,14 @@ impl eframe::App for App {
                 .default_size(340.0)
                 .size_range(290.0..=520.0)
                 .show(ui, |ui| panels::right(ui, &mut self.editor));
+        }
+        if self.editor.settings.uv_view {
+            Panel::bottom("uv view")
+                .frame(side)
+                .resizable(true)
+                .default_size(280.0)
+                .size_range(140.0..=640.0)
+                .show(ui, |ui| uv::show(ui, &mut self.editor));
         }
         CentralPanel::default().frame(Frame::NONE).show(ui, |ui| self.editor.show_viewport(ui));
 

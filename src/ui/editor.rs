@@ -7,7 +7,9 @@ use super::actions::Action;
 use super::autosave::Autosave;
 use super::dialogs::{Dialog, PathField, Problem, SaveWhat, Then};
 use super::files::Files;
+use super::linked::Linked;
 use super::palette::Palette;
+use super::panels::uv::UvView;
 use super::settings::{Settings, Theme};
 use super::tools::{PickList, Tool};
 use super::viewport::Viewport;
@@ -93,6 +95,10 @@ pub struct Editor {
     pub recoveries: Vec<Recovery>,
     /// Puts changes aside.
     pub autosave: Autosave,
+    /// The uv view.
+    pub uv: UvView,
+    /// The point that the 3D view and the uv view show together.
+    pub linked: Option<Linked>,
     /// Set when the window may close.
     pub may_close: bool,
 }
@@ -188,6 +194,7 @@ impl Editor {
             Action::DarkTheme => self.settings.theme == Theme::Dark,
             Action::LeftPanel => self.settings.left_panel,
             Action::RightPanel => self.settings.right_panel,
+            Action::UvView => self.settings.uv_view,
             Action::SelectTool => matches!(self.tool, Tool::Select),
             Action::PatchTool => matches!(self.tool, Tool::Patch(_)),
             _ => return None,
@@ -291,6 +298,13 @@ impl Editor {
             }
             Action::RightPanel => {
                 self.settings.right_panel ^= true;
+                self.store_settings();
+            }
+            Action::UvView => {
+                self.settings.uv_view ^= true;
+                self.uv.pointer = None;
+                self.link_from_domain(None);
+                self.tool_uv_pointer(None);
                 self.store_settings();
             }
             Action::ShowTool => self.show_page(Page::Tool),

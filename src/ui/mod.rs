@@ -11,6 +11,7 @@ mod export;
 mod files;
 mod hints;
 mod icons;
+mod linked;
 pub mod paint;
 mod palette;
 mod panels;

@@ -34,6 +34,8 @@ pub struct Settings {
     pub left_panel: bool,
     /// Whether the right panel is shown.
     pub right_panel: bool,
+    /// Whether the uv view is shown.
+    pub uv_view: bool,
 }
 
 impl Default for Settings {
@@ -44,6 +46,7 @@ impl Default for Settings {
             recent: Vec::new(),
             left_panel: true,
             right_panel: true,
+            uv_view: false,
         }
     }
 }

@@ -16,6 +16,8 @@ pub mod scene;
 pub mod section;
 pub mod segment_tree;
 pub mod snap;
+pub mod uv;
+pub mod uv_map;
 pub mod viewport;
 pub mod visibility;
 pub mod worst;

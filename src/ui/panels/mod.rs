@@ -11,6 +11,7 @@ mod outliner;
 mod patches;
 mod properties;
 mod report;
+pub mod uv;
 
 /// The left panel: outliner above, properties below.
 pub fn left(ui: &mut Ui, editor: &mut Editor) {

@@ -1,14 +1,18 @@
 //! The tools: what a click in the view means, what the status line says, what the Tool page shows.
 
+use std::sync::Arc;
+
 use egui::{Order, Ui, vec2};
 use glam::{DVec2, DVec3};
 
 use super::editor::Editor;
 use super::hints::CurveHint;
+use super::panels::uv::UvPointer;
 use super::viewport::{Overlay, Pointer, curve_name};
 use super::{status, theme};
 use crate::view::patch_tool::{Event, Stage};
 use crate::view::pick::{Filter, PickHit, Target};
+use crate::view::uv::UvPicture;
 
 mod legend;
 mod patch;
@@ -113,6 +117,23 @@ impl Editor {
         match &self.tool {
             Tool::Select => Overlay::default(),
             Tool::Patch(session) => session.overlay(&self.viewport.scene, dark),
+        }
+    }
+
+    /// What the active tool shows in the uv view, one picture a surface, at most two at once; nothing: the plain
+    /// domains of what is selected. It is asked every frame, so a tool keeps its pictures.
+    pub fn tool_uv(&self) -> Vec<Arc<UvPicture>> {
+        match &self.tool {
+            Tool::Select | Tool::Patch(_) => Vec::new(),
+        }
+    }
+
+    /// What the mouse did in the uv view, for the active tool; nothing while it is elsewhere. Marks are known by the
+    /// numbers that the tool gave them.
+    pub fn tool_uv_pointer(&mut self, _pointer: Option<&UvPointer>) {
+        match &self.tool {
+            // Neither marks anything there.
+            Tool::Select | Tool::Patch(_) => {}
         }
     }
 

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use super::Viewport;
 use crate::view::camera::Camera;
 use crate::view::navigation::{Button, Drag, Modifiers, Preset, wheel};
-use crate::view::pick::{Filter, PickHit, PickOptions, Target, pick, pick_all, under_cursor};
+use crate::view::pick::{Filter, PickHit, PickOptions, Target, is_hidden, pick, pick_all, under_cursor};
 use crate::view::snap::{Snap, SnapOptions, snap};
 
 /// Points of scrolling that count as one notch of the wheel.
@@ -67,6 +67,11 @@ impl Viewport {
     /// What a pixel snaps to.
     pub fn snap(&self, pixel: DVec2, filter: Filter, options: &SnapOptions, suspended: bool) -> Option<Snap> {
         snap(&self.scene, &self.view(), pixel, &self.options(filter, &[]), options, suspended)
+    }
+
+    /// Whether a surface is in front of a point of the model.
+    pub fn hides(&self, point: DVec3) -> bool {
+        is_hidden(&self.scene, &self.view(), point, &self.options(Filter::ALL, &[]))
     }
 
     /// Moves the camera and says what the left button did. `points` are those that the tool offers, `stamp` changes
@@ -203,7 +208,7 @@ impl Viewport {
     }
 
     /// The surface parameters of a hit.
-    fn hit_uv(&self, hit: &PickHit) -> Option<DVec2> {
+    pub fn hit_uv(&self, hit: &PickHit) -> Option<DVec2> {
         match hit.target {
             Target::Surface { uv, .. } => Some(uv),
             Target::Curve { curve, t } => self.scene.curve_item(&curve)?.geometry.curve_uv(&curve, t),

@@ -30,6 +30,7 @@ impl Editor {
             true => Pointer::default(),
             false => self.viewport.pointer(ui, &response, self.settings.navigation, filter, &points, stamp),
         };
+        self.link_from_view(&pointer);
         if !self.viewport.drag_section(&pointer) {
             self.tool_pointer(&pointer);
         }
@@ -52,6 +53,7 @@ impl Editor {
         self.viewport.section_handle(ui, pointer.pixel);
         self.viewport.anchor_mark(ui);
         self.tool_labels(ui, &pointer);
+        self.linked_mark(ui);
         self.name_tag(ui, &pointer);
         self.viewport.triad(ui);
         self.context_menu(&response);
