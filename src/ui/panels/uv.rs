@@ -406,10 +406,10 @@ impl Pen<'_> {
         let y = (domain.bottom() + 3.0).min(self.pane.bottom() - 16.0);
         text(pos2(domain.left(), y), Align2::LEFT_TOP, short(u0), t.text[1]);
         text(pos2(domain.right(), y), Align2::RIGHT_TOP, short(u1), t.text[1]);
-        text(pos2(inner.center().x, y), Align2::CENTER_TOP, "u →".to_owned(), t.text[1]);
+        text(pos2(inner.center().x, y), Align2::CENTER_TOP, "u".to_owned(), t.text[1]);
         let x = (domain.left() - 5.0).max(self.pane.left() + 40.0);
         text(pos2(x, domain.bottom()), Align2::RIGHT_BOTTOM, short(v0), t.text[1]);
         text(pos2(x, domain.top()), Align2::RIGHT_TOP, short(v1), t.text[1]);
-        text(pos2(x, inner.center().y), Align2::RIGHT_CENTER, "v ↑".to_owned(), t.text[1]);
+        text(pos2(x, inner.center().y), Align2::RIGHT_CENTER, "v".to_owned(), t.text[1]);
     }
 }
