@@ -208,13 +208,13 @@ fn hover(window: &mut Window, at: Pos2) {
 #[test]
 fn the_uv_view_and_the_3d_view_share_one_cursor() {
     let mut window = opened("surfaces_with_gap.igs");
-    window.get_by_label("left panel").click();
+    window.get_by_label("right panel").click();
     settle(&mut window);
     key(&mut window, Modifiers::NONE, Key::U);
     assert!(window.state().editor.settings.uv_view);
-    let pane = window.get_by_label("uv view of left panel").rect();
+    let pane = window.get_by_label("uv view of right panel").rect();
     hover(&mut window, pane.center());
-    let (entity, surface) = window.state().editor.document().surfaces().next().map(|(e, s)| (e, s.clone())).unwrap();
+    let (entity, surface) = window.state().editor.document().surfaces().nth(1).map(|(e, s)| (e, s.clone())).unwrap();
     let [u, v] = surface.domain();
     let middle = glam::DVec2::new(0.5 * (u[0] + u[1]), 0.5 * (v[0] + v[1]));
     let linked = window.state().editor.linked.unwrap();
@@ -233,7 +233,7 @@ fn the_uv_view_and_the_3d_view_share_one_cursor() {
     hover(&mut window, pos2(4.0, 4.0));
     assert!(window.state().editor.linked.is_none());
     key(&mut window, Modifiers::NONE, Key::U);
-    assert!(window.query_by_label("uv view of left panel").is_none());
+    assert!(window.query_by_label("uv view of right panel").is_none());
 }
 
 #[test]

@@ -15,6 +15,7 @@ use glam::DVec2;
 use super::super::actions::Action;
 use super::super::editor::Editor;
 use super::super::icons::{self, Icon};
+use super::super::linked::From;
 use super::super::status::short;
 use super::super::theme::{self, Tokens};
 use super::super::viewport::tag;
@@ -184,7 +185,15 @@ impl UvView {
         if let Some(mark) = hit.and_then(|hit| picture.marks.get(hit.mark)) {
             pen.mark(mark, 1.5);
         }
-        pen.cursor(editor, picture);
+        match pixel.and(self.pointer) {
+            Some(pointer) => pen.cursor(picture, pointer.uv, false),
+            None => {
+                let linked = editor.linked.filter(|l| l.entity == picture.entity && l.from == From::Space);
+                if let Some(linked) = linked {
+                    pen.cursor(picture, linked.uv, true);
+                }
+            }
+        }
         pen.frame_of_numbers(picture);
         if let (Some(at), Some(mark)) = (at, hit.and_then(|hit| picture.marks.get(hit.mark)))
             && !mark.label.is_empty()
@@ -376,15 +385,14 @@ impl Pen<'_> {
         }
     }
 
-    /// The linked cursor: a cross over the domain.
-    fn cursor(&self, editor: &Editor, picture: &UvPicture) {
-        let Some(linked) = editor.linked.filter(|l| l.entity == picture.entity) else { return };
+    /// The linked cursor: a cross over the domain, with a dot where the mouse is elsewhere.
+    fn cursor(&self, picture: &UvPicture, uv: DVec2, dot: bool) {
         let domain = self.corners(picture);
-        let at = self.at(linked.uv);
+        let at = self.at(uv);
         let stroke = Stroke::new(1.0, self.t.accent.gamma_multiply(0.6));
         self.painter.vline(at.x, domain.y_range(), stroke);
         self.painter.hline(domain.x_range(), at.y, stroke);
-        if linked.from == super::super::linked::From::Space {
+        if dot {
             self.painter.circle(at, 4.0, self.t.accent, Stroke::new(1.5, self.t.field));
         }
     }
