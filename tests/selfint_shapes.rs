@@ -3,88 +3,17 @@
 
 #![allow(clippy::unwrap_used, reason = "a test helper may stop the test")]
 
+#[path = "support/shapes.rs"]
+mod shapes;
+
 use std::time::Instant;
 
-use glam::{DMat3, DQuat, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 use patchwright::kernel::geom::{Knots, Surface};
 use patchwright::kernel::job::Job;
 use patchwright::kernel::self_ssi::{SelfIntersectOptions, SelfIntersection, self_intersect};
 use patchwright::kernel::ssi::result::{CurveEnd, CurveKind, IntersectionCurve};
-
-/// Solves the interpolation problem of one direction: rows of basis values at the Greville abscissae.
-fn interpolate_line(knots: &Knots, values: &[DVec3]) -> Vec<DVec3> {
-    let n = knots.control_count();
-    let mut rows: Vec<(Vec<f64>, DVec3)> = knots
-        .greville()
-        .iter()
-        .zip(values)
-        .map(|(&t, &value)| {
-            let basis = knots.basis(t, 0);
-            let mut row = vec![0.0; n];
-            for i in 0..=knots.degree() {
-                row[basis.first + i] = basis.d[0][i];
-            }
-            (row, value)
-        })
-        .collect();
-    for c in 0..n {
-        let pivot = (c..n).max_by(|&a, &b| rows[a].0[c].abs().total_cmp(&rows[b].0[c].abs())).unwrap();
-        rows.swap(c, pivot);
-        for r in c + 1..n {
-            let m = rows[r].0[c] / rows[c].0[c];
-            if m != 0.0 {
-                for k in c..n {
-                    let x = rows[c].0[k];
-                    rows[r].0[k] -= m * x;
-                }
-                let x = rows[c].1;
-                rows[r].1 -= x * m;
-            }
-        }
-    }
-    let mut out = vec![DVec3::ZERO; n];
-    for c in (0..n).rev() {
-        let sum: DVec3 = (c + 1..n).map(|k| out[k] * rows[c].0[k]).sum();
-        out[c] = (rows[c].1 - sum) / rows[c].0[c];
-    }
-    out
-}
-
-/// The spline through `f` at the Greville abscissae: exact where `f` is a polynomial of no higher degree.
-fn interpolate(u: &Knots, v: &Knots, f: impl Fn(f64, f64) -> DVec3) -> Surface {
-    let (gu, gv) = (u.greville(), v.greville());
-    let rows: Vec<Vec<DVec3>> =
-        gv.iter().map(|&t| interpolate_line(u, &gu.iter().map(|&s| f(s, t)).collect::<Vec<_>>())).collect();
-    let (nu, nv) = (gu.len(), gv.len());
-    let mut points = vec![DVec3::ZERO; nu * nv];
-    for i in 0..nu {
-        let column = interpolate_line(v, &rows.iter().map(|row| row[i]).collect::<Vec<_>>());
-        for (j, p) in column.into_iter().enumerate() {
-            points[j * nu + i] = p;
-        }
-    }
-    Surface::new(u.clone(), v.clone(), points, None).unwrap()
-}
-
-fn square() -> Knots {
-    Knots::bezier(3, -1.0, 1.0).unwrap()
-}
-
-fn spans(n: usize) -> Knots {
-    let breaks: Vec<f64> = (0..=n).map(|k| -1.0 + 2.0 * k as f64 / n as f64).collect();
-    Knots::clamped(3, &breaks, 1).unwrap()
-}
-
-/// A rigid motion in general position.
-fn turned(p: DVec3) -> DVec3 {
-    DMat3::from_quat(DQuat::from_axis_angle(DVec3::new(0.3, 1.0, -0.7).normalize(), 1.1)) * p
-        + DVec3::new(0.2, -0.4, 0.9)
-}
-
-/// The domain turned by an angle, so that nothing runs along u or v.
-fn spun(u: f64, v: f64) -> DVec2 {
-    DVec2::from_angle(0.4).rotate(DVec2::new(u, v)) + DVec2::new(0.03, -0.05)
-}
+use shapes::{interpolate, ridge, sextic, spans, spun, square, turned};
 
 fn solve(name: &str, surface: &Surface) -> SelfIntersection {
     let started = Instant::now();
@@ -114,16 +43,6 @@ fn solve(name: &str, surface: &Surface) -> SelfIntersection {
 
 fn curves(found: &SelfIntersection) -> Vec<&IntersectionCurve> {
     found.result.curves.iter().filter(|c| c.kind == CurveKind::SelfIntersection).collect()
-}
-
-/// The family (x, y^2, y^3 + c(x) y): double points are (x, +-y) with y^2 = -c(x), miter points the zeros of c.
-fn ridge(c: impl Fn(f64) -> f64) -> impl Fn(f64, f64) -> DVec3 {
-    move |u, v| turned(DVec3::new(u, v * v, v * v * v + c(u) * v))
-}
-
-/// Pulls a surface of a polynomial of degree 3 through a turned domain: the degree rises to 6 x 6.
-fn sextic() -> Knots {
-    Knots::bezier(6, -1.0, 1.0).unwrap()
 }
 
 #[test]
@@ -292,12 +211,16 @@ fn bad_input_has_a_defined_answer_in_bounded_time() {
     for (name, surface) in &bad {
         let started = Instant::now();
         let found = solve(name, surface);
+        for u in &found.result.unresolved {
+            println!("   open: {u:?}");
+        }
         // Caps bound the work; the time is generous because a test machine may be busy.
         assert!(started.elapsed().as_secs_f64() < 30.0, "{name}");
         assert!(found.result.miters.len() <= 2, "{name}: a cusp edge is no thousand miter points");
         let cusps = found.result.curves.iter().filter(|c| c.kind == CurveKind::CuspEdge).count();
         assert_eq!(cusps, usize::from(name.contains("cusp") || name.contains("folded")), "{name}");
-        assert_eq!(found.result.complete, *name == "flat", "{name}: what is not proved is not complete");
+        let collapsed = ["point", "line"].contains(name);
+        assert_eq!(found.result.complete, !collapsed && !name.contains("steep"), "{name}");
     }
 }
 
@@ -307,15 +230,14 @@ fn a_patch_folded_onto_itself_is_one_region() {
     let found = solve("fold", &interpolate(&k, &k, |u, v| turned(DVec3::new(u * u, v, 0.3 * v * v))));
     let result = &found.result;
     assert_eq!(result.regions.len(), 1);
-    assert!(!result.complete && result.miters.is_empty());
+    assert!(result.complete && result.miters.is_empty());
     assert!(result.regions[0].max_distance < 1e-11);
-    // One half of the domain lies on the other, up to the strip beside the fold, which is a cusp edge.
+    // One half of the domain lies on the other, up to the fold, which is a cusp edge.
     let outer = &result.regions[0].boundary[0];
     let area: f64 = outer.windows(2).map(|s| 0.5 * s[0].uv.perp_dot(s[1].uv)).sum();
-    assert!(area > 1.8 && area <= 2.0, "{area}");
+    assert!((area - 2.0).abs() < 1e-9, "{area}");
     for p in outer {
-        // Closest points near the fold are double roots: half of the digits.
-        assert!((p.uv.x + p.st.x).abs() < 1e-6 && (p.uv.y - p.st.y).abs() < 1e-6, "{} {}", p.uv, p.st);
+        assert!((p.uv.x + p.st.x).abs() < 1e-9 && (p.uv.y - p.st.y).abs() < 1e-9, "{} {}", p.uv, p.st);
     }
     assert_eq!(result.curves.iter().filter(|c| c.kind == CurveKind::CuspEdge).count(), 1);
     assert!(curves(&found).is_empty());

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use super::{CliError, Common, Exit, ProgressLine};
-use crate::kernel::self_ssi::{SelfIntersectOptions, self_intersect};
-use crate::kernel::ssi::result::{CurveEnd, Intersection};
+use crate::kernel::self_ssi::SelfIntersectOptions;
+use crate::kernel::self_ssi::model::{merged, self_intersect_all};
+use crate::kernel::ssi::result::CurveEnd;
 
 /// Arguments of `self-intersect`.
 #[derive(Debug, clap::Args)]
@@ -39,11 +40,8 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
     let job = super::job();
     let progress = ProgressLine::watch(&job);
     let options = SelfIntersectOptions { tol: args.tol, ..SelfIntersectOptions::default() };
-    let mut all = Intersection { complete: true, ..Intersection::default() };
-    for number in numbers {
-        let one = self_intersect(&surfaces[number], number, &options, &job)?.result;
-        append(&mut all, one);
-    }
+    let chosen: Vec<_> = numbers.filter_map(|n| surfaces.get(n).map(|s| (n, s))).collect();
+    let all = merged(self_intersect_all(&chosen, &options, &job)?.into_iter().map(|found| found.result));
     drop(progress);
     for warning in job.warnings() {
         common.warn(warning);
@@ -74,29 +72,4 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
     } else {
         Exit::Incomplete
     })
-}
-
-/// Adds the result of one more surface, renumbering what its curves refer to.
-fn append(all: &mut Intersection, mut one: Intersection) {
-    let (miters, regions) = (all.miters.len(), all.regions.len());
-    let junctions = all.junctions.len();
-    for curve in &mut one.curves {
-        for (end, id) in curve.ends.iter().zip(&mut curve.end_ids) {
-            let first = if *end == CurveEnd::Junction { junctions } else { miters };
-            *id = id.map(|id| id + first);
-        }
-        curve.region = curve.region.map(|r| r + regions);
-    }
-    all.complete &= one.complete;
-    all.tol = all.tol.max(one.tol);
-    all.curves.append(&mut one.curves);
-    all.junctions.append(&mut one.junctions);
-    all.miters.append(&mut one.miters);
-    all.regions.append(&mut one.regions);
-    all.unresolved.append(&mut one.unresolved);
-    all.counts.leaf_pairs += one.counts.leaf_pairs;
-    all.counts.nodes_built += one.counts.nodes_built;
-    all.time_ms.build += one.time_ms.build;
-    all.time_ms.traverse += one.time_ms.traverse;
-    all.time_ms.curves += one.time_ms.curves;
 }

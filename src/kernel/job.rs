@@ -8,9 +8,17 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::{fmt, sync::Arc};
 
 /// A handle on a running computation. See the module's text.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 pub struct Job {
     shared: Arc<Shared>,
+    /// What this handle's 0 and 1 are in the progress of the whole.
+    range: [f64; 2],
+}
+
+impl Default for Job {
+    fn default() -> Self {
+        Self { shared: Arc::default(), range: [0.0, 1.0] }
+    }
 }
 
 #[derive(Default)]
@@ -42,8 +50,17 @@ impl Job {
     /// is ignored.
     pub fn progress(&self, done: f64) {
         if done >= 0.0 {
-            self.shared.progress.fetch_max(done.min(1.0).to_bits(), Ordering::Relaxed);
+            let [from, to] = self.range;
+            let done = from + (to - from) * done.min(1.0);
+            self.shared.progress.fetch_max(done.to_bits(), Ordering::Relaxed);
         }
+    }
+
+    /// A handle for a part of the work, whose progress 0..=1 is `from..=to` of this one's. Everything else is shared.
+    #[must_use]
+    pub fn part(&self, from: f64, to: f64) -> Self {
+        let at = |t: f64| self.range[0] + (self.range[1] - self.range[0]) * t.clamp(0.0, 1.0);
+        Self { shared: Arc::clone(&self.shared), range: [at(from), at(to)] }
     }
 
     /// The largest progress reported so far.
@@ -99,6 +116,18 @@ mod tests {
         assert_eq!(job.done(), 0.2);
         job.progress(7.0);
         assert_eq!(job.done(), 1.0);
+    }
+
+    #[test]
+    fn a_part_reports_its_share() {
+        let job = Job::new();
+        let second = job.part(0.5, 1.0).part(0.0, 0.5);
+        second.progress(0.0);
+        assert_eq!(job.done(), 0.5);
+        second.progress(1.0);
+        assert_eq!(job.done(), 0.75);
+        second.cancel();
+        assert!(job.is_cancelled());
     }
 
     #[test]

@@ -4,81 +4,36 @@
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a benchmark may stop at a broken surface")]
 
+#[path = "../support/shapes.rs"]
+mod shapes;
+
 use std::time::Instant;
 
-use glam::{DVec2, DVec3};
-use patchwright::kernel::geom::{Knots, Surface};
+use glam::DVec3;
+use patchwright::kernel::geom::Surface;
 use patchwright::kernel::job::Job;
 use patchwright::kernel::self_ssi::{SelfIntersectOptions, self_intersect};
+use shapes::{interpolate, ridge, spans, spun};
 
-/// Interpolates one line of values at the Greville abscissae.
-fn interpolate_line(knots: &Knots, values: &[DVec3]) -> Vec<DVec3> {
-    let n = knots.control_count();
-    let mut rows: Vec<(Vec<f64>, DVec3)> = Vec::new();
-    for (&t, &value) in knots.greville().iter().zip(values) {
-        let basis = knots.basis(t, 0);
-        let mut row = vec![0.0; n];
-        row[basis.first..=basis.first + knots.degree()].copy_from_slice(&basis.d[0][..=knots.degree()]);
-        rows.push((row, value));
-    }
-    // Collocation matrices of B-splines are totally positive: no pivoting.
-    for c in 0..n {
-        for r in c + 1..(c + knots.degree() + 1).min(n) {
-            let m = rows[r].0[c] / rows[c].0[c];
-            for k in c..n {
-                let x = rows[c].0[k];
-                rows[r].0[k] -= m * x;
-            }
-            let x = rows[c].1;
-            rows[r].1 -= x * m;
-        }
-    }
-    let mut out = vec![DVec3::ZERO; n];
-    for c in (0..n).rev() {
-        let sum: DVec3 = (c + 1..n).map(|k| out[k] * rows[c].0[k]).sum();
-        out[c] = (rows[c].1 - sum) / rows[c].0[c];
-    }
-    out
-}
-
-fn interpolate(u: &Knots, v: &Knots, f: impl Fn(f64, f64) -> DVec3) -> Surface {
-    let (gu, gv) = (u.greville(), v.greville());
-    let rows: Vec<Vec<DVec3>> =
-        gv.iter().map(|&t| interpolate_line(u, &gu.iter().map(|&s| f(s, t)).collect::<Vec<_>>())).collect();
-    let mut points = vec![DVec3::ZERO; gu.len() * gv.len()];
-    for i in 0..gu.len() {
-        let column = interpolate_line(v, &rows.iter().map(|row| row[i]).collect::<Vec<_>>());
-        for (j, p) in column.into_iter().enumerate() {
-            points[j * gu.len() + i] = p;
-        }
-    }
-    Surface::new(u.clone(), v.clone(), points, None).unwrap()
-}
-
-fn spans(n: usize) -> Knots {
-    let breaks: Vec<f64> = (0..=n).map(|k| -1.0 + 2.0 * k as f64 / n as f64).collect();
-    Knots::clamped(3, &breaks, 1).unwrap()
-}
-
-/// (x, y^2, y^3 + c(x) y) over a domain turned by 0.4: miter points at the zeros of c, in general position.
-fn ridge(c: impl Fn(f64) -> f64) -> impl Fn(f64, f64) -> DVec3 {
+/// The same over a domain turned by 0.4: miter points in general position.
+fn oblique(c: impl Fn(f64) -> f64) -> impl Fn(f64, f64) -> DVec3 {
+    let ridge = ridge(c);
     move |u, v| {
-        let p = DVec2::from_angle(0.4).rotate(DVec2::new(u, v)) + DVec2::new(0.03, -0.05);
-        DVec3::new(p.x, p.y * p.y, p.y * p.y * p.y + c(p.x) * p.y)
+        let p = spun(u, v);
+        ridge(p.x, p.y)
     }
 }
 
 fn main() {
     let one = spans(1);
     let tau = std::f64::consts::TAU;
-    let straight = |c: fn(f64) -> f64| move |u: f64, v: f64| DVec3::new(u, v * v, v * v * v + c(u) * v);
     let cases: Vec<(&str, &str, f64, Surface)> = vec![
         ("one cross-cap", "148-258 ms", 5.0, interpolate(&one, &one, |u, v| DVec3::new(u, u * v, v * v))),
-        ("two miters, arc", "0.9-3.5 s", 20.0, interpolate(&one, &one, straight(|x| x * x - 0.36))),
-        ("two miters, open", "0.9-3.5 s", 20.0, interpolate(&one, &one, straight(|x| 0.25 - x * x))),
-        ("two miters 0.1 apart", "0.9-3.5 s", 20.0, interpolate(&one, &one, straight(|x| x * x - 0.0025))),
-        ("two miters 0.01 apart", "0.9-3.5 s", 20.0, interpolate(&one, &one, straight(|x| x * x - 0.000025))),
-        ("three miters", "0.9-3.5 s", 20.0, interpolate(&one, &one, straight(|x| x * (x * x - 0.3)))),
+        ("two miters, arc", "0.9-3.5 s", 20.0, interpolate(&one, &one, ridge(|x| x * x - 0.36))),
+        ("two miters, open", "0.9-3.5 s", 20.0, interpolate(&one, &one, ridge(|x| 0.25 - x * x))),
+        ("two miters 0.1 apart", "0.9-3.5 s", 20.0, interpolate(&one, &one, ridge(|x| x * x - 0.0025))),
+        ("two miters 0.01 apart", "0.9-3.5 s", 20.0, interpolate(&one, &one, ridge(|x| x * x - 0.000025))),
+        ("three miters", "0.9-3.5 s", 20.0, interpolate(&one, &one, ridge(|x| x * (x * x - 0.3)))),
         (
             "global fold",
             "30-209 ms",
@@ -130,9 +85,9 @@ fn main() {
                 DVec3::new(r * a.cos() + 0.15 * u, r * a.sin(), 0.45 * b.sin() + 0.35 * u)
             }),
         ),
-        ("(Miter-A) three", "49.7 s", 500.0, interpolate(&spans(20), &spans(8), ridge(|x| x * (x * x - 0.3)))),
-        ("(Miter-B) one", "13.6 s", 500.0, interpolate(&spans(12), &spans(12), ridge(|x| x + 0.2 * (3.0 * x).sin()))),
-        ("(Miter-C) two, arc", "30.6 s", 500.0, interpolate(&spans(12), &spans(12), ridge(|x| x * x - 0.2))),
+        ("(Miter-A) three", "49.7 s", 500.0, interpolate(&spans(20), &spans(8), oblique(|x| x * (x * x - 0.3)))),
+        ("(Miter-B) one", "13.6 s", 500.0, interpolate(&spans(12), &spans(12), oblique(|x| x + 0.2 * (3.0 * x).sin()))),
+        ("(Miter-C) two, arc", "30.6 s", 500.0, interpolate(&spans(12), &spans(12), oblique(|x| x * x - 0.2))),
     ];
     println!(
         "one thread          patches | curves miters complete |  pairs windows | ours: median      best | target | peer, thesis"

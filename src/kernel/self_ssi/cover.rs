@@ -3,28 +3,26 @@
 //! that solution lies on a traced branch. What remains is listed.
 //!
 //! Descent: Algorithms 1 and 2 of the thesis (6.2) over the ternary split, lazily: a window proved injective drops
-//! its subtree, a pair is dropped as soon as one test decides it, whatever its level. Below the grid, cells are halved.
-//! The pair test: with the parameter x4 along which the solution curve runs fastest, the other three columns of the
-//! Jacobian, preconditioned at the middle, are bounded over a box 3.25 times as large (on the piece, continued). Where
-//! I - E is an M-matrix there is at most one solution for each x4 in the large box; the slopes (I - E)^-1 |Y c4| bound
-//! how far the solution curve moves, so that a curve that meets the small box runs through the large one over the
-//! whole range of x4, and Newton at any x4 finds it. No certificate rests on what Newton fails to find.
+//! its subtree, a pair is dropped as soon as one test decides it ([`super::pair_test`]), whatever its level. Below the
+//! grid, cells are halved.
 
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
+use super::cusp::{CuspEdge, CuspWindow, cusp_window};
 use super::hull::{Hull, Rect, range};
-use super::march::{self, Pace, Trace};
+use super::march::Pace;
 use super::miter::{MiterKind, MiterPoint};
+use super::pair_test::{Verdict, examine};
+use super::record::{FailedWindow, NodeRole, NodeState, Record, TernaryNode, unsettled};
+use super::register::Register;
 use super::sheet::Sheet;
 use super::ternary::{self, Span};
-use super::window::{contracts, cross_cap, injective};
+use super::window::{cross_cap, injective};
 use crate::kernel::job::Job;
 
-/// How much larger than the box the box of the pair test is.
-const GROWTH: f64 = 3.25;
 /// The smallest box.
 const SMALLEST: f64 = 1e-7;
 /// With more unresolved boxes than this the search gives up.
@@ -43,7 +41,8 @@ struct Part {
 
 #[derive(Clone, Copy, Debug)]
 enum Item {
-    Alone(Part),
+    /// With the number of splits above it and its role.
+    Alone(Part, u32, NodeRole),
     Pair(Part, Part),
 }
 
@@ -59,6 +58,8 @@ pub(crate) struct Coincidence {
 pub(crate) struct Cover {
     pub open: Vec<([Rect; 2], &'static str)>,
     pub coincident: Vec<Coincidence>,
+    /// Windows folded onto themselves along the cusp edge with this number.
+    pub folds: Vec<(usize, Rect)>,
     /// Windows that were tested and not proved injective.
     pub failed_windows: usize,
     pub windows: usize,
@@ -78,34 +79,30 @@ fn key(rect: &Rect) -> Key {
 pub(crate) struct Search<'a> {
     sheet: &'a Sheet,
     miters: &'a [MiterPoint],
-    cusps: &'a [Vec<DVec2>],
+    cusps: &'a [CuspEdge],
     pace: Pace,
     cap: usize,
     job: &'a Job,
     /// Mean |Su| and |Sv| of the surface.
     speed: [f64; 2],
     /// Grid lines.
-    lines: [Vec<f64>; 2],
+    pub lines: [Vec<f64>; 2],
     hulls: HashMap<Key, Rc<Hull>>,
     injective: HashMap<Key, bool>,
     capped_window: HashMap<Key, bool>,
+    cusp_window: HashMap<Key, Option<CuspWindow>>,
     leaves: HashSet<(Key, Key)>,
-    pub traces: Vec<Trace>,
-    boxes: Vec<Vec<[[f64; 4]; 2]>>,
+    pub register: Register<'a>,
+    /// What is visited, when it is asked for.
+    pub record: Option<Record>,
     pub found: Cover,
-}
-
-enum Verdict {
-    Empty,
-    Covered,
-    Split,
 }
 
 impl<'a> Search<'a> {
     pub fn new(
         sheet: &'a Sheet,
         miters: &'a [MiterPoint],
-        cusps: &'a [Vec<DVec2>],
+        cusps: &'a [CuspEdge],
         grid: u32,
         pace: Pace,
         cap: usize,
@@ -138,47 +135,19 @@ impl<'a> Search<'a> {
             hulls: HashMap::new(),
             injective: HashMap::new(),
             capped_window: HashMap::new(),
+            cusp_window: HashMap::new(),
             leaves: HashSet::new(),
-            traces: Vec::new(),
-            boxes: Vec::new(),
+            register: Register::new(sheet),
+            record: None,
             found: Cover::default(),
         }
-    }
-
-    /// Adds a branch that was traced.
-    pub fn register(&mut self, trace: Trace) {
-        let boxes = trace
-            .nodes
-            .windows(2)
-            .collect::<Vec<_>>()
-            .chunks(16)
-            .map(|chunk| {
-                let mut b = [[f64::INFINITY; 4], [f64::NEG_INFINITY; 4]];
-                for pair in chunk {
-                    for [p, q] in *pair {
-                        for (k, x) in [p.x, p.y, q.x, q.y].into_iter().enumerate() {
-                            b[0][k] = b[0][k].min(x);
-                            b[1][k] = b[1][k].max(x);
-                        }
-                    }
-                }
-                for k in 0..4 {
-                    let slack = 0.1 * (b[1][k] - b[0][k]) + 1e-7;
-                    b[0][k] -= slack;
-                    b[1][k] += slack;
-                }
-                b
-            })
-            .collect();
-        self.boxes.push(boxes);
-        self.traces.push(trace);
     }
 
     /// Runs the search over the whole domain.
     pub fn run(&mut self) {
         let whole = [0, 1].map(|d| Span::new(0, self.lines[d].len() as u32 - 1));
         let root = self.part(whole, whole);
-        let mut stack: Vec<Item> = root.map(Item::Alone).into_iter().collect();
+        let mut stack: Vec<Item> = root.map(|r| Item::Alone(r, 0, NodeRole::Root)).into_iter().collect();
         let mut steps = 0;
         while let Some(item) = stack.pop() {
             steps += 1;
@@ -194,7 +163,7 @@ impl<'a> Search<'a> {
                 };
                 for item in stack.drain(..).chain([item]).take(64) {
                     let pair = match item {
-                        Item::Alone(a) => [a.rect; 2],
+                        Item::Alone(a, ..) => [a.rect; 2],
                         Item::Pair(a, b) => [a.rect, b.rect],
                     };
                     self.found.open.push((pair, reason));
@@ -202,9 +171,12 @@ impl<'a> Search<'a> {
                 break;
             }
             match item {
-                Item::Alone(a) => self.alone(a, &mut stack),
+                Item::Alone(a, level, role) => self.alone(a, level, role, &mut stack),
                 Item::Pair(a, b) => self.pair(a, b, &mut stack),
             }
+        }
+        if self.record.is_some() {
+            self.record_windows();
         }
         self.found.hulls = self.hulls.len();
         self.found.open = merged(std::mem::take(&mut self.found.open));
@@ -275,18 +247,20 @@ impl<'a> Search<'a> {
     }
 
     /// Algorithm 1.
-    fn alone(&mut self, part: Part, stack: &mut Vec<Item>) {
-        if self.window(&part.rect) {
+    fn alone(&mut self, part: Part, level: u32, role: NodeRole, stack: &mut Vec<Item>) {
+        let proved = self.window(&part.rect);
+        self.record_node(&part, level, role, proved);
+        if proved {
             return;
         }
-        if part.rect.size().max_element() < SMALLEST || self.in_cusp_strip(&part.rect, &part.rect) {
-            if !self.in_cusp_strip(&part.rect, &part.rect) {
-                self.found.open.push(([part.rect; 2], "a window could not be proved free of self-intersection"));
-            }
+        if part.rect.size().max_element() < SMALLEST {
+            self.found.open.push(([part.rect; 2], "a window could not be proved free of self-intersection"));
             return;
         }
         let ([first, middle, last], core) = self.children(&part);
-        stack.extend([first, middle, last].into_iter().flatten().map(Item::Alone));
+        for (child, role) in [(first, NodeRole::First), (middle, NodeRole::Middle), (last, NodeRole::Last)] {
+            stack.extend(child.map(|c| Item::Alone(c, level + 1, role)));
+        }
         let mut pair = |a: Option<Part>, b: Option<Part>| {
             if let (Some(a), Some(b)) = (a, b) {
                 stack.push(Item::Pair(a, b));
@@ -311,6 +285,63 @@ impl<'a> Search<'a> {
         pair(outside(last, middle, false), core);
     }
 
+    /// Notes a node that was visited.
+    fn record_node(&mut self, part: &Part, level: u32, role: NodeRole, proved: bool) {
+        let injective = self.injective.get(&key(&part.rect)).copied().unwrap_or(false);
+        if self.record.is_none() {
+            return;
+        }
+        let lines = &self.lines;
+        let cell = |d: usize, x: f64| lines[d].partition_point(|&l| l < x) as u32;
+        let on_grid = |x: DVec2| (0..2).all(|d| lines[d].get(cell(d, x[d]) as usize) == Some(&x[d]));
+        let cells = (on_grid(part.rect.low) && on_grid(part.rect.high))
+            .then(|| [0, 1].map(|d| [cell(d, part.rect.low[d]), cell(d, part.rect.high[d])]));
+        let at_cusp = self.cusp_window.get(&key(&part.rect)).is_some_and(Option::is_some);
+        let state = match (proved, injective) {
+            (_, true) => NodeState::Injective,
+            (true, false) if at_cusp => NodeState::CuspEdge,
+            (true, false) => NodeState::MiterPoint,
+            (false, false) => NodeState::Split,
+        };
+        let Some(record) = &mut self.record else { return };
+        record.nodes.push(TernaryNode { level, uv_box: self.sheet.in_surface(&part.rect), cells, role, state });
+    }
+
+    /// Tests the windows of 2 x 2 and 3 x 3 cells that no proved node contains.
+    fn record_windows(&mut self) {
+        let Some(record) = &self.record else { return };
+        let settled: Vec<[Span; 2]> = record
+            .nodes
+            .iter()
+            .filter(|n| n.state != NodeState::Split)
+            .filter_map(|n| n.cells)
+            .map(|c| c.map(|[low, high]| Span::new(low, high)))
+            .collect();
+        let cells = [0, 1].map(|d| self.lines[d].len() as u32 - 1);
+        let mut failed = Vec::new();
+        for size in [2, 3] {
+            for first in unsettled(cells, size, &settled) {
+                if self.job.is_cancelled() {
+                    return;
+                }
+                let at = |d: usize, k: u32| self.lines[d][k as usize];
+                let rect = Rect::new(
+                    DVec2::new(at(0, first[0]), at(1, first[1])),
+                    DVec2::new(at(0, first[0] + size), at(1, first[1] + size)),
+                );
+                if !self.window(&rect) {
+                    failed.push(FailedWindow { size, first, uv_box: self.sheet.in_surface(&rect) });
+                }
+            }
+        }
+        let lines = [0, 1]
+            .map(|d| self.lines[d].iter().map(|&t| self.sheet.to_surface(DVec2::splat(t))[d]).collect::<Vec<f64>>());
+        if let Some(record) = &mut self.record {
+            record.windows = failed;
+            record.lines = lines;
+        }
+    }
+
     /// Whether a window is proved injective, or to hold one miter point's branch only.
     fn window(&mut self, rect: &Rect) -> bool {
         let k = key(rect);
@@ -326,7 +357,7 @@ impl<'a> Search<'a> {
                 proved
             }
         };
-        proved || self.miter_window(rect)
+        proved || self.miter_window(rect) || self.window_at_cusp(rect)
     }
 
     /// Whether the window, grown to three times its size, holds exactly one miter point and only its branch.
@@ -358,17 +389,21 @@ impl<'a> Search<'a> {
         us.flat_map(move |i| vs.clone().map(move |j| at + DVec2::new(f64::from(i), f64::from(j))))
     }
 
-    /// Whether both boxes are small and lie beside the same cusp edge, which is reported instead.
-    fn in_cusp_strip(&self, a: &Rect, b: &Rect) -> bool {
-        const STRIP: f64 = 1.0 / 128.0;
-        if self.cusps.is_empty() || a.size().max_element().max(b.size().max_element()) > STRIP {
+    /// Whether the window holds a cusp edge and nothing else; folds are noted.
+    fn window_at_cusp(&mut self, rect: &Rect) -> bool {
+        if self.cusps.is_empty() {
             return false;
         }
-        let near = |r: &Rect| {
-            let grown = Rect::new(r.low - STRIP, r.high + STRIP);
-            self.cusps.iter().flatten().any(|&c| grown.contains(c))
-        };
-        near(a) && near(b) && a.center().distance(b.center()) < 6.0 * STRIP
+        let known = self.cusp_window.get(&key(rect)).copied();
+        let found = known.unwrap_or_else(|| {
+            let found = cusp_window(self.sheet, self.cusps, rect);
+            self.cusp_window.insert(key(rect), found);
+            if let Some(CuspWindow::Folded(edge)) = found {
+                self.found.folds.push((edge, *rect));
+            }
+            found
+        });
+        found.is_some()
     }
 
     /// Algorithm 2.
@@ -396,14 +431,14 @@ impl<'a> Search<'a> {
         {
             if a.grid.is_none() && b.grid.is_none() && self.leaves.insert((key(&a.rect), key(&b.rect))) {
                 self.found.leaf_pairs += 1;
+                if let Some(record) = &mut self.record {
+                    record.leaf_pairs.push([self.sheet.in_surface(&a.rect), self.sheet.in_surface(&b.rect)]);
+                }
             }
-            match self.examine(&a.rect, pa, &b.rect, pb) {
+            match examine(self.sheet, &mut self.register, &self.pace, self.job, [(&a.rect, pa), (&b.rect, pb)]) {
                 Verdict::Empty | Verdict::Covered => return,
                 Verdict::Split => {}
             }
-        }
-        if self.in_cusp_strip(&a.rect, &b.rect) {
-            return;
         }
         if (FINEST_COINCIDENCE..COINCIDENCE_CELL).contains(&size)
             && let (Some(pa), Some(pb)) = (self.sheet.single_piece(&a.rect), self.sheet.single_piece(&b.rect))
@@ -434,181 +469,6 @@ impl<'a> Search<'a> {
         let y = mean(&ta) - mean(&tb);
         let (ra, rb) = (range(y, &ta), range(y, &tb));
         ra[0] > 1e-12 * ra[1] && rb[1] < 1e-12 * rb[0]
-    }
-
-    /// The pair test. See the module's text.
-    fn examine(&mut self, a: &Rect, pa: usize, b: &Rect, pb: usize) -> Verdict {
-        let sheet = self.sheet;
-        let (half_a, half_b) = (a.size() * 0.5, b.size() * 0.5);
-        let half = [half_a.x, half_a.y, half_b.x, half_b.y];
-        let center = [a.center().x, a.center().y, b.center().x, b.center().y];
-        let (ja, jb) = (sheet.jet_on(pa, a.center(), 1), sheet.jet_on(pb, b.center(), 1));
-        let columns = [ja.d[0] * half[0], ja.d[1] * half[1], -jb.d[0] * half[2], -jb.d[1] * half[3]];
-        let Some(t) = march::tangent(&super::chart::Value { f: DVec3::ZERO, j: columns }) else {
-            return Verdict::Split;
-        };
-        let k = (0..4).fold(0, |best, k| if t[k].abs() > t[best].abs() { k } else { best });
-        let others: Vec<usize> = (0..4).filter(|&j| j != k).collect();
-        let frame = DMat3::from_cols(columns[others[0]], columns[others[1]], columns[others[2]]);
-        let inverse = frame.inverse();
-        if !inverse.is_finite() {
-            return Verdict::Split;
-        }
-        let step = inverse * (ja.s - jb.s);
-        // A cheap look first: at the middle the curve is far out of reach of any box that could pass.
-        let grow = (GROWTH - 1.0) * 0.5;
-        let (ga, gb) = (sheet.hull_on(pa, &a.grown(grow)), sheet.hull_on(pb, &b.grown(grow)));
-        let mut error = [[0.0; 3]; 3];
-        let mut drift = [0.0; 3];
-        for i in 0..3 {
-            let y = inverse.row(i);
-            let of = |c: usize| {
-                let points = [&ga.du, &ga.dv, &gb.du, &gb.dv][c];
-                let [low, high] = range(y, points);
-                let s = half[c] * if c < 2 { 1.0 } else { -1.0 };
-                if s >= 0.0 { [low * s, high * s] } else { [high * s, low * s] }
-            };
-            for (j, &c) in others.iter().enumerate() {
-                let unit = if i == j { 1.0 } else { 0.0 };
-                let [low, high] = of(c);
-                error[i][j] = (high - unit).abs().max((low - unit).abs());
-            }
-            let [low, high] = of(k);
-            drift[i] = low.abs().max(high.abs());
-        }
-        if (0..3).any(|i| step[i].abs() > 1.0 + error[i].iter().sum::<f64>() + drift[i]) {
-            return Verdict::Empty;
-        }
-        if !contracts(&error) {
-            return Verdict::Split;
-        }
-        let rest = DMat3::IDENTITY
-            - DMat3::from_cols(
-                DVec3::new(error[0][0], error[1][0], error[2][0]),
-                DVec3::new(error[0][1], error[1][1], error[2][1]),
-                DVec3::new(error[0][2], error[1][2], error[2][2]),
-            );
-        let slope = rest.inverse() * DVec3::from(drift);
-        if !slope.is_finite() || slope.max_element() * 2.0 + 1.0 > GROWTH {
-            return Verdict::Split;
-        }
-        let at = |x4: f64| -> Option<[f64; 4]> { solve_at(sheet, [pa, pb], center, half, k, x4, step, &others) };
-        let Some(z) = at(0.0) else { return Verdict::Split };
-        for (i, &c) in others.iter().enumerate() {
-            let offset = (z[c] - center[c]).abs() / half[c];
-            if offset > 1.0 + slope[i] {
-                // Newton in a box with one solution at most: outside the reach of the small box, so none meets it.
-                return if offset < GROWTH { Verdict::Empty } else { Verdict::Split };
-            }
-        }
-        let mut reach = [1.0; 4];
-        for (i, &c) in others.iter().enumerate() {
-            reach[c] = slope[i];
-        }
-        let limits = [sheet.pieces[pa].low, sheet.pieces[pa].high, sheet.pieces[pb].low, sheet.pieces[pb].high];
-        let mut open = vec![(-1.0, 1.0, 0)];
-        let mut settled = true;
-        while let Some((from, to, depth)) = open.pop() {
-            let Some(z) = at(0.5 * (from + to)) else {
-                settled = false;
-                break;
-            };
-            let width: f64 = 0.5 * (to - from);
-            let (mut least, mut outside, mut sure) = (f64::INFINITY, false, true);
-            for c in 0..4 {
-                let (low, high) =
-                    if c < 2 { (limits[0][c], limits[1][c]) } else { (limits[2][c - 2], limits[3][c - 2]) };
-                let margin = (z[c] - low).min(high - z[c]);
-                least = least.min(margin);
-                outside |= margin < -(reach[c] * width * half[c]) - 1e-9;
-                sure &= margin >= reach[c] * width * half[c];
-            }
-            if outside {
-                continue;
-            }
-            let inside = least >= -1e-9;
-            if inside && !self.traced(z) {
-                let (p, q) = (DVec2::new(z[0], z[1]), DVec2::new(z[2], z[3]));
-                match march::through(sheet, p, q, &self.pace, self.job) {
-                    Some(trace) => self.register(trace),
-                    None => {
-                        settled = false;
-                        break;
-                    }
-                }
-                if !self.traced(z) {
-                    settled = false;
-                    break;
-                }
-            }
-            if !sure && depth < if inside { 3 } else { 8 } {
-                let middle = 0.5 * (from + to);
-                open.push((from, middle, depth + 1));
-                open.push((middle, to, depth + 1));
-            }
-        }
-        if settled { Verdict::Covered } else { Verdict::Split }
-    }
-
-    /// Whether a solution lies on a traced branch.
-    fn traced(&self, z: [f64; 4]) -> bool {
-        let (p, q) = (DVec2::new(z[0], z[1]), DVec2::new(z[2], z[3]));
-        for (trace, boxes) in self.traces.iter().zip(&self.boxes) {
-            for (at, b) in boxes.iter().enumerate() {
-                for pair in [[p, q], [q, p]] {
-                    // Traces run on across seams: bring the pair to the turn of this stretch.
-                    let middle = DVec2::new(b[0][0] + b[1][0], b[0][1] + b[1][1]) * 0.5;
-                    let other = DVec2::new(b[0][2] + b[1][2], b[0][3] + b[1][3]) * 0.5;
-                    let pair = [
-                        pair[0] + march::turns(self.sheet, middle, pair[0]),
-                        pair[1] + march::turns(self.sheet, other, pair[1]),
-                    ];
-                    let y = [pair[0].x, pair[0].y, pair[1].x, pair[1].y];
-                    if (0..4).any(|k| y[k] < b[0][k] || y[k] > b[1][k]) {
-                        continue;
-                    }
-                    let last = (at * 16 + 16).min(trace.nodes.len() - 1);
-                    if trace.nodes[at * 16..=last].windows(2).any(|s| self.on_segment(pair, s[0], s[1])) {
-                        return true;
-                    }
-                }
-            }
-        }
-        false
-    }
-
-    /// Whether a solution lies on the branch between two of its nodes.
-    fn on_segment(&self, y: [DVec2; 2], a: [DVec2; 2], b: [DVec2; 2]) -> bool {
-        let along = [b[0] - a[0], b[1] - a[1]];
-        let to = [y[0] - a[0], y[1] - a[1]];
-        let dot = |a: [DVec2; 2], b: [DVec2; 2]| a[0].dot(b[0]) + a[1].dot(b[1]);
-        let squared = dot(along, along);
-        if squared <= 0.0 {
-            return dot(to, to) < 1e-16;
-        }
-        let at = dot(to, along) / squared;
-        if !(-0.05..=1.05).contains(&at) {
-            return false;
-        }
-        let off = [to[0] - along[0] * at, to[1] - along[1] * at];
-        let distance = dot(off, off);
-        if distance < 1e-18 {
-            return true;
-        }
-        if distance > 0.05 * squared + 1e-16 {
-            return false;
-        }
-        // The branch point with the same projection on the chord decides.
-        let [p, q] = [a[0] + along[0] * at, a[1] + along[1] * at];
-        let row = [along[0].x, along[0].y, along[1].x, along[1].y].map(|x| x / squared.sqrt());
-        let chart = super::chart::Chart::Far([p.x, p.y, q.x, q.y]);
-        match march::correct(self.sheet, chart, &row, 0.5 * squared.sqrt() + 1e-7) {
-            Some((c, _)) => {
-                let [p, q] = c.points();
-                p.distance(y[0]) + q.distance(y[1]) < 1e-7
-            }
-            None => false,
-        }
     }
 
     /// Whether two boxes coincide over an area: `None` when they do not, otherwise whether points of one have their
@@ -671,47 +531,6 @@ pub(crate) fn foot(sheet: &Sheet, piece: usize, from: DVec2, s: DVec3) -> Option
         }
     }
     Some((q, sheet.jet_on(piece, q, 0).s.distance(s)))
-}
-
-/// The solution of S(p) = S(q) on two continued pieces with one of the four parameters fixed.
-#[allow(clippy::too_many_arguments)]
-fn solve_at(
-    sheet: &Sheet,
-    [pa, pb]: [usize; 2],
-    center: [f64; 4],
-    half: [f64; 4],
-    k: usize,
-    x4: f64,
-    step: DVec3,
-    others: &[usize],
-) -> Option<[f64; 4]> {
-    let mut z = center;
-    z[k] += x4 * half[k];
-    for (i, &c) in others.iter().enumerate() {
-        z[c] -= step[i].clamp(-GROWTH, GROWTH) * half[c];
-    }
-    let mut last = f64::INFINITY;
-    for _ in 0..20 {
-        let (a, b) = (sheet.jet_on(pa, DVec2::new(z[0], z[1]), 1), sheet.jet_on(pb, DVec2::new(z[2], z[3]), 1));
-        let columns = [a.d[0], a.d[1], -b.d[0], -b.d[1]];
-        let frame = DMat3::from_cols(columns[others[0]], columns[others[1]], columns[others[2]]);
-        let d = frame.inverse() * (b.s - a.s);
-        if !d.is_finite() {
-            return None;
-        }
-        for (i, &c) in others.iter().enumerate() {
-            z[c] += d[i];
-        }
-        if (0..4).any(|c| (z[c] - center[c]).abs() > 4.0 * GROWTH * half[c]) {
-            return None;
-        }
-        let size = d.length();
-        if size < 1e-13 || (size < 1e-10 && size > 0.3 * last) {
-            return Some(z);
-        }
-        last = size;
-    }
-    None
 }
 
 /// The direction in which two rectangles of the same parent differ.

@@ -382,6 +382,64 @@ impl Sheet {
         }
     }
 
+    /// Points around the third derivatives uuu, uuv, uvv, vvv over a rectangle. `None` for rational surfaces and across
+    /// borders of pieces without two continuous derivatives.
+    pub fn third_hull(&self, rect: &Rect) -> Option<[Vec<DVec3>; 4]> {
+        let parts = self.parts(rect);
+        if self.rational || (parts.len() > 1 && !self.twice_smooth(rect)) {
+            return None;
+        }
+        let [p, q] = self.degree;
+        let mut all: [Vec<DVec3>; 4] = Default::default();
+        for (piece, part) in parts {
+            let size = part.size();
+            let part = self.enlarged(piece, &part);
+            debug_assert!(size.x > 0.0 && size.y > 0.0);
+            let size = part.size();
+            let pos: Vec<DVec3> = self.net(piece, &part).iter().map(|h| h.truncate()).collect();
+            for (k, points) in all.iter_mut().enumerate() {
+                // k derivatives by v, 3 - k by u.
+                let (mut net, mut width, mut height, mut degree) = (pos.clone(), p + 1, q + 1, [p, q]);
+                for d in (0..3).map(|i| usize::from(i >= 3 - k)) {
+                    if degree[d] == 0 {
+                        net = vec![DVec3::ZERO];
+                        break;
+                    }
+                    net = differences(&net, width, height, d, degree[d], size[d]);
+                    degree[d] -= 1;
+                    if d == 0 { width -= 1 } else { height -= 1 }
+                }
+                points.extend(net);
+            }
+        }
+        Some(all)
+    }
+
+    /// Whether second derivatives are continuous across the borders of pieces inside a rectangle: compared at points.
+    fn twice_smooth(&self, rect: &Rect) -> bool {
+        let step = 1.0 / 8.0;
+        (0..2).all(|d| {
+            let turns = rect.low[d].floor() as i64..=rect.high[d].floor() as i64;
+            turns.flat_map(|turn| self.breaks[d].iter().map(move |b| b + turn as f64)).all(|line| {
+                let open = line <= 0.0 || line >= 1.0;
+                if line <= rect.low[d] || line >= rect.high[d] || (open && !self.periodic[d]) {
+                    return true;
+                }
+                (0..=8).all(|k| {
+                    let other = rect.low[1 - d] + rect.size()[1 - d] * f64::from(k) * step;
+                    let at = |by: f64| {
+                        let mut p = DVec2::splat(other);
+                        p[d] = line + by;
+                        self.wrapped(p)
+                    };
+                    let [a, b] = [-1e-9, 1e-9].map(|by| self.jet(at(by), 2));
+                    let size = a.dd.iter().map(|x| x.length()).fold(0.0, f64::max);
+                    a.dd.iter().zip(&b.dd).all(|(x, y)| x.distance(*y) <= 1e-5 * (1.0 + size))
+                })
+            })
+        })
+    }
+
     /// The homogeneous control points of a piece restricted (or continued) to a rectangle.
     fn net(&self, piece: usize, rect: &Rect) -> Vec<DVec4> {
         let piece = &self.pieces[piece];

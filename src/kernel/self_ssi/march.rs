@@ -13,6 +13,7 @@ use glam::{DMat3, DVec2};
 use super::chart::{Chart, Value};
 use super::sheet::Sheet;
 use crate::kernel::job::Job;
+use crate::kernel::num::linear;
 
 /// How a trace ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +22,8 @@ pub(crate) enum End {
     /// In a miter point at these parameters.
     Miter(DVec2),
     Loop,
+    /// In the triple point with this number.
+    Triple(usize),
     /// Newton failed or a cap was hit.
     Lost,
 }
@@ -48,31 +51,7 @@ const SHORTEST: f64 = 1e-10;
 
 /// Solves the 4 x 4 system `[j; row] d = [f, g]`.
 fn solve(j: &[glam::DVec3; 4], row: &[f64; 4], f: glam::DVec3, g: f64) -> Option<[f64; 4]> {
-    let mut a = [[0.0; 5]; 4];
-    for k in 0..4 {
-        (a[0][k], a[1][k], a[2][k], a[3][k]) = (j[k].x, j[k].y, j[k].z, row[k]);
-    }
-    (a[0][4], a[1][4], a[2][4], a[3][4]) = (f.x, f.y, f.z, g);
-    for c in 0..4 {
-        let pivot = (c..4).max_by(|&x, &y| a[x][c].abs().total_cmp(&a[y][c].abs()))?;
-        a.swap(c, pivot);
-        let p = a[c][c];
-        if p == 0.0 || !p.is_finite() {
-            return None;
-        }
-        for r in c + 1..4 {
-            let m = a[r][c] / p;
-            for k in c..5 {
-                a[r][k] -= m * a[c][k];
-            }
-        }
-    }
-    let mut d = [0.0; 4];
-    for c in (0..4).rev() {
-        let sum: f64 = (c + 1..4).map(|k| a[c][k] * d[k]).sum();
-        d[c] = (a[c][4] - sum) / a[c][c];
-    }
-    d.iter().all(|x| x.is_finite()).then_some(d)
+    linear::solve([j.map(|c| c.x), j.map(|c| c.y), j.map(|c| c.z), *row], [f.x, f.y, f.z, g])
 }
 
 fn dot(a: &[f64; 4], b: &[f64; 4]) -> f64 {
@@ -116,6 +95,33 @@ pub(crate) fn correct(sheet: &Sheet, chart: Chart, row: &[f64; 4], reach: f64) -
             return Some((here, here.value(sheet)));
         }
         last = step;
+    }
+    None
+}
+
+/// The branch point in the plane `normal . x = level`, by Newton from a pair close to it.
+pub(crate) fn on_plane(sheet: &Sheet, start: Chart, normal: glam::DVec3, level: f64) -> Option<Chart> {
+    let mut chart = start;
+    for _ in 0..30 {
+        let value = chart.value(sheet);
+        let [a, b] = chart.points().map(|p| sheet.jet(p, 1));
+        let height = 0.5 * normal.dot(a.s + b.s) - level;
+        let row = [0, 1, 2, 3].map(|k| {
+            let mut unit = [0.0; 4];
+            unit[k] = 1.0;
+            let [p, q] = chart.motion(unit);
+            0.5 * normal.dot(a.d[0] * p.x + a.d[1] * p.y + b.d[0] * q.x + b.d[1] * q.y)
+        });
+        let d = solve(&value.j, &row, -value.f, -height)?;
+        let y = chart.y();
+        chart = chart.with([0, 1, 2, 3].map(|k| y[k] + d[k]));
+        let moved = [0, 1].map(|k| chart.points()[k].distance(start.points()[k]));
+        if !(moved[0].max(moved[1]) < 0.2) {
+            return None;
+        }
+        if length(&d) < 1e-12 {
+            return Some(chart);
+        }
     }
     None
 }

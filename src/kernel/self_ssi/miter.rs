@@ -12,6 +12,7 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use super::chart::{Value, near};
+use super::cusp::{CuspEdge, follow};
 use super::hull::{Hull, Rect, range};
 use super::sheet::Sheet;
 use super::window;
@@ -54,7 +55,7 @@ impl MiterPoint {
 pub(crate) struct Miters {
     pub points: Vec<MiterPoint>,
     /// Curves along which Su x Sv vanishes.
-    pub cusps: Vec<Vec<DVec2>>,
+    pub cusps: Vec<CuspEdge>,
     /// Cells that could not be decided.
     pub open: Vec<Rect>,
     /// Cells that were looked at.
@@ -162,9 +163,9 @@ fn cross_net(du: &[DVec3], dv: &[DVec3], [p, q]: [usize; 2]) -> Vec<DVec3> {
 /// Looks for the miter point of a cell; true when the cell needs no further splitting.
 fn decided(sheet: &Sheet, piece: usize, rect: &Rect, out: &mut Miters, job: &Job) -> bool {
     let size = rect.size().max_element();
-    let beside = |cusps: &[Vec<DVec2>]| {
+    let beside = |cusps: &[CuspEdge]| {
         let grown = rect.grown(0.6);
-        cusps.iter().flatten().any(|&c| grown.contains(c))
+        cusps.iter().flat_map(CuspEdge::nodes).any(|c| grown.contains(c.at))
     };
     if size <= CUSP_CELL && beside(&out.cusps) {
         return true;
@@ -192,10 +193,10 @@ fn decided(sheet: &Sheet, piece: usize, rect: &Rect, out: &mut Miters, job: &Job
     if size > CUSP_CELL || known {
         return known && size < 1e-5;
     }
-    if let Some(cusp) = cusp_edge(sheet, y, &frame, job) {
+    if let Some(cusp) = follow(sheet, y, &frame, job) {
         // Where the whole edge is one point it is a pole, not an edge.
         let s = sheet.point(m);
-        if cusp.iter().any(|&c| sheet.point(c).distance(s) > 1e-9) {
+        if cusp.nodes().iter().any(|c| sheet.point(c.at).distance(s) > 1e-9) {
             out.cusps.push(cusp);
             return beside(&out.cusps);
         }
@@ -208,11 +209,27 @@ fn decided(sheet: &Sheet, piece: usize, rect: &Rect, out: &mut Miters, job: &Job
     size < 1e-5
 }
 
+/// The cross-cap that Newton finds from a point of the domain; `None` where there is none.
+pub(crate) fn polished(sheet: &Sheet, from: DVec2) -> Option<MiterPoint> {
+    let (y, value) = newton(sheet, from)?;
+    let m = DVec2::new(y[0], y[1]);
+    let jet = sheet.jet(m, 2);
+    let generic = is_regular(&DMat3::from_cols(value.j[0], value.j[1], value.j[2]));
+    (generic && in_domain(sheet, m)).then_some(MiterPoint {
+        at: m,
+        phi: y[2],
+        kind: MiterKind::CrossCap,
+        first: jet.d,
+        second: jet.dd,
+        split: [0.0; 3],
+    })
+}
+
 fn in_domain(sheet: &Sheet, m: DVec2) -> bool {
     (0..2).all(|d| sheet.periodic[d] || (-1e-10..=1.0 + 1e-10).contains(&m[d]))
 }
 
-fn at(sheet: &Sheet, y: [f64; 3]) -> Value {
+pub(crate) fn at(sheet: &Sheet, y: [f64; 3]) -> Value {
     near(sheet, DVec2::new(y[0], y[1]), y[2], 0.0)
 }
 
@@ -254,7 +271,7 @@ fn is_regular(frame: &DMat3) -> bool {
 }
 
 /// Solves a 3 x 3 system; near-singular ones in the sense of damped least squares.
-fn damped(frame: &DMat3, f: DVec3) -> Option<DVec3> {
+pub(crate) fn damped(frame: &DMat3, f: DVec3) -> Option<DVec3> {
     if is_regular(frame) {
         return Some(frame.inverse() * f);
     }
@@ -268,7 +285,7 @@ fn damped(frame: &DMat3, f: DVec3) -> Option<DVec3> {
 }
 
 /// The kernel of a (nearly) singular matrix.
-fn kernel(frame: &DMat3) -> DVec3 {
+pub(crate) fn kernel(frame: &DMat3) -> DVec3 {
     let rows = [frame.row(0), frame.row(1), frame.row(2)];
     let candidates = [rows[0].cross(rows[1]), rows[1].cross(rows[2]), rows[2].cross(rows[0])];
     candidates
@@ -276,55 +293,6 @@ fn kernel(frame: &DMat3) -> DVec3 {
         .max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))
         .unwrap_or(DVec3::X)
         .normalize_or_zero()
-}
-
-/// Follows zeros of the miter system along its kernel; `None` when there are none beside the first.
-fn cusp_edge(sheet: &Sheet, start: [f64; 3], frame: &DMat3, job: &Job) -> Option<Vec<DVec2>> {
-    const STEP: f64 = 1.0 / 256.0;
-    let mut sides = Vec::new();
-    for sign in [1.0, -1.0] {
-        let mut side = Vec::new();
-        let mut y = DVec3::from(start);
-        let mut n = kernel(frame) * sign;
-        while side.len() < 4096 && !job.is_cancelled() {
-            if n.truncate().length() < 1e-6 {
-                break;
-            }
-            let mut z = y + n * (STEP / n.truncate().length());
-            let mut value = at(sheet, z.into());
-            for _ in 0..20 {
-                let frame = DMat3::from_cols(value.j[0], value.j[1], value.j[2]);
-                let Some(mut d) = damped(&frame, value.f) else { break };
-                d -= n * n.dot(d);
-                z -= d;
-                value = at(sheet, z.into());
-                if d.length() < 1e-12 {
-                    break;
-                }
-            }
-            let speed = value.j[2].length() + value.j[0].length();
-            if value.f.length() > 1e-9 * speed || z.distance(y) > 4.0 * STEP {
-                break;
-            }
-            let m = z.truncate();
-            let clamped = m.clamp(DVec2::ZERO, DVec2::ONE);
-            side.push(clamped);
-            if clamped.distance(m) > 1e-9
-                || (side.len() > 8 && clamped.distance(DVec2::new(start[0], start[1])) < 0.5 * STEP)
-            {
-                break;
-            }
-            let next = kernel(&DMat3::from_cols(value.j[0], value.j[1], value.j[2]));
-            n = if next.dot(n) < 0.0 { -next } else { next };
-            y = z;
-        }
-        sides.push(side);
-    }
-    let ahead = sides.swap_remove(0);
-    let mut all: Vec<DVec2> = sides.swap_remove(0).into_iter().rev().collect();
-    all.push(DVec2::new(start[0], start[1]));
-    all.extend(ahead);
-    (all.len() > 4).then_some(all)
 }
 
 /// Tells isolated miter points from those with two branches.
@@ -345,28 +313,5 @@ fn degenerate(sheet: &Sheet, y: [f64; 3], frame: &DMat3) -> (MiterKind, [f64; 3]
         (MiterKind::TwoBranches, along.into())
     } else {
         (MiterKind::Isolated, [0.0; 3])
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::kernel::geom::{Knots, Surface};
-
-    #[test]
-    fn a_cusp_edge_is_one_curve_and_no_points() {
-        // (u^2, u^3, v) over [-1, 1] x [0, 1].
-        let k = Knots::bezier(3, 0.0, 1.0).unwrap();
-        // Bezier ordinates over [-1, 1] of u^2 and u^3.
-        let (squares, cubes) = ([1.0, -1.0 / 3.0, -1.0 / 3.0, 1.0], [-1.0, 1.0, -1.0, 1.0]);
-        let points = (0..16).map(|at| DVec3::new(squares[at % 4], cubes[at % 4], (at / 4) as f64 / 3.0)).collect();
-        let surface = Surface::new(k.clone(), k, points, None).unwrap();
-        let sheet = Sheet::new(&surface, 1e-11);
-        let found = find(&sheet, &Job::new());
-        assert_eq!((found.points.len(), found.cusps.len(), found.open.len()), (0, 1, 0), "{} cells", found.cells);
-        let edge = &found.cusps[0];
-        assert!(edge.iter().all(|p| (p.x - 0.5).abs() < 1e-9));
-        let ends = [edge[0].y, edge[edge.len() - 1].y];
-        assert_eq!((ends[0].min(ends[1]), ends[0].max(ends[1])), (0.0, 1.0));
     }
 }

@@ -8,9 +8,10 @@
 //! which proves local injectivity only; and the search certifies that no branch was missed ([`Evidence`], and
 //! `unresolved` in the result). Closed directions wrap: a seam is no self-intersection, a curve through it is one curve.
 //!
-//! Files: `sheet` (the surface prepared), `hull` (bounds of derivatives), `window` (the two window proofs), `miter`,
-//! `chart` and `march` (the equation and its tracing), `ternary` and `cover` (the search), `quad`, `region`
-//! (coincident areas) and `assemble` (the result).
+//! Files: `sheet` (the surface prepared), `hull` (bounds of derivatives), `window` (the window proofs), `miter`, `chart`
+//! and `march` (the equation and its tracing), `register` (the branches found), `ternary`, `pair_test` and `cover` (the
+//! search), `quad` and `leaf` (miter quadrangles), `record` (the search as data), `triple` (triple points), `cusp` (cusp edges), `region` and `outline` (coincident areas),
+//! `assemble` (the result), `contour` and `section` (a miter neighbourhood cut by a plane), `model` (all surfaces).
 //!
 //! Cost: well under a millisecond for a cross-cap patch, then proportional to the length of the curves over the square
 //! root of the tolerance. How it fails: pairs of cells in which the surface touches itself without crossing are listed
@@ -18,14 +19,24 @@
 
 mod assemble;
 mod chart;
+mod contour;
 mod cover;
+mod cusp;
 mod hull;
+pub mod leaf;
 mod march;
 mod miter;
+pub mod model;
+mod outline;
+mod pair_test;
 mod quad;
+pub mod record;
 mod region;
+mod register;
+pub mod section;
 mod sheet;
 mod ternary;
+mod triple;
 mod window;
 
 use std::time::Instant;
@@ -37,11 +48,13 @@ use self::cover::Search;
 use self::hull::Rect;
 use self::march::{End, Pace, Trace};
 use self::miter::MiterKind;
+use self::record::Record;
 use self::sheet::Sheet;
 use crate::kernel::geom::Surface;
 use crate::kernel::job::Job;
 use crate::kernel::ssi::result::{
-    Counts, CurveEnd, CurveKind, CurvePoint, Intersection, IntersectionCurve, Miter, Region, Times, Unresolved,
+    Counts, CurveEnd, CurveKind, CurvePoint, Intersection, IntersectionCurve, Junction, JunctionKind, Miter, Region,
+    Times, Unresolved,
 };
 use crate::kernel::tol::Tolerances;
 
@@ -59,11 +72,13 @@ pub struct SelfIntersectOptions {
     pub pair_cap: usize,
     /// The most points of one curve.
     pub point_cap: usize,
+    /// Whether to keep a [`Record`] of what the search did, for display.
+    pub record: bool,
 }
 
 impl Default for SelfIntersectOptions {
     fn default() -> Self {
-        Self { tol: None, miter_radius: None, grid: 128, pair_cap: 250_000, point_cap: 200_000 }
+        Self { tol: None, miter_radius: None, grid: 128, pair_cap: 250_000, point_cap: 200_000, record: false }
     }
 }
 
@@ -77,6 +92,12 @@ pub enum SelfIntersectError {
         name: &'static str,
         /// What was given.
         value: f64,
+    },
+    /// There is no miter point where one was said to be.
+    #[error("there is no miter point at the parameters ({}, {}); take one from the list of miter points", at.x, at.y)]
+    NoMiterPoint {
+        /// The parameters that were given.
+        at: DVec2,
     },
 }
 
@@ -98,8 +119,12 @@ pub struct Evidence {
 pub struct SelfIntersection {
     /// Curves, miter points, regions, and what could not be resolved.
     pub result: Intersection,
+    /// Triple points, in the order of the junctions: the three parameter points in which three sheets meet.
+    pub triple_points: Vec<[DVec2; 3]>,
     /// What the search did.
     pub evidence: Evidence,
+    /// The same as data to look at; `None` where it was not asked for.
+    pub record: Option<Record>,
 }
 
 /// Computes where a surface meets itself. `number` is the surface's number in the result. Cancelled: what was found so
@@ -122,16 +147,13 @@ pub fn self_intersect(
     let radius = options.miter_radius.unwrap_or(tolerances.follow) / sheet.scale;
     let mut result = Intersection { tol, ..Intersection::default() };
     let open = |[a, b]: [Rect; 2], reason: &str| {
-        let in_domain = |r: Rect| {
-            let (low, high) = (sheet.to_surface(r.low), sheet.to_surface(r.high));
-            [[low.x, high.x], [low.y, high.y]]
-        };
-        Unresolved { a: number, uv_box: in_domain(a), b: number, st_box: in_domain(b), reason: reason.to_owned() }
+        let (uv_box, st_box) = (sheet.in_surface(&a), sheet.in_surface(&b));
+        Unresolved { a: number, uv_box, b: number, st_box, reason: reason.to_owned() }
     };
     if collapsed(&sheet) {
         let whole = Rect::new(DVec2::ZERO, DVec2::ONE);
         result.unresolved.push(open([whole; 2], "the surface is collapsed to a curve or a point"));
-        return Ok(SelfIntersection { result, evidence: Evidence::default() });
+        return Ok(SelfIntersection { result, ..SelfIntersection::default() });
     }
 
     job.phase("Finding miter points");
@@ -141,20 +163,32 @@ pub fn self_intersect(
 
     job.phase("Tracing and proving");
     let mut search = Search::new(&sheet, &miters.points, &miters.cusps, options.grid, pace, options.pair_cap, job);
+    search.record = options.record.then(Record::default);
     for miter in &miters.points {
-        for trace in branches(&sheet, miter, &search.traces, &pace, job) {
-            search.register(trace);
+        for trace in branches(&sheet, miter, &search.register.traces, &pace, job) {
+            search.register.add(trace);
         }
     }
     job.progress(0.2);
     search.run();
-    let found = search.found;
-    let mut traces = search.traces;
+    let Search { found, register, mut record, lines, .. } = search;
+    let mut traces = register.traces;
     let traversed = started.elapsed();
     job.progress(0.8);
 
     job.phase("Assembling curves");
     let mut assembler = Assembler::new(&sheet, number);
+    let (triples, missing) = triple::cut(&sheet, &mut traces);
+    if missing > 0 {
+        job.warn(format!(
+            "{missing} crossings of self-intersection curves are no triple points that could be resolved"
+        ));
+    }
+    for &[p, q, _] in &triples {
+        let CurvePoint { xyz, uv, st, .. } = assembler.point([p, q].map(|p| sheet.wrapped(p)));
+        let kind = JunctionKind::HigherOrder;
+        result.junctions.push(Junction { xyz, a: number, uv, b: number, st, gap: 0.0, kind });
+    }
     for trace in &mut traces {
         let bound = assembler.refine(trace, tol / sheet.scale) * sheet.scale;
         let mut ends = [CurveEnd::Unresolved; 2];
@@ -164,6 +198,10 @@ pub fn self_intersect(
                 End::Border => CurveEnd::Boundary,
                 End::Loop => CurveEnd::Loop,
                 End::Lost => CurveEnd::Unresolved,
+                End::Triple(at) => {
+                    end_ids[k] = Some(at);
+                    CurveEnd::Junction
+                }
                 End::Miter(at) => {
                     end_ids[k] = miters.points.iter().position(|m| same(&sheet, m.at, at));
                     if end_ids[k].is_some() { CurveEnd::Miter } else { CurveEnd::Unresolved }
@@ -183,26 +221,37 @@ pub fn self_intersect(
         result.curves.push(IntersectionCurve { kind, closed, ends, end_ids, error_bound: bound, region: None, points });
     }
     for cusp in &miters.cusps {
-        let points = cusp.iter().map(|&c| assembler.point([c, c])).collect();
-        let bound = cusp.windows(2).map(|s| assembler.bound([s[0]; 2], [s[1]; 2])).fold(0.0, f64::max) * sheet.scale;
-        let strip = cusp.iter().fold(Rect::new(cusp[0], cusp[0]), |r, &c| r.union(&Rect::new(c, c)));
-        result.unresolved.push(open([strip; 2], "pairs in the strip beside a cusp edge were not examined"));
-        let [start, end] = [cusp.first(), cusp.last()].map(|c| {
-            let on_border = c.is_some_and(|c| c.min_element() == 0.0 || c.max_element() == 1.0);
-            if on_border { CurveEnd::Boundary } else { CurveEnd::Unresolved }
+        let nodes = cusp.nodes();
+        let points = nodes.iter().map(|c| assembler.point([sheet.wrapped(c.at); 2])).collect();
+        let bound = nodes.windows(2).map(|s| assembler.bound([s[0].at; 2], [s[1].at; 2])).fold(0.0, f64::max);
+        let ends = [nodes.first(), nodes.last()].map(|c| {
+            let on_border = c.is_some_and(|c| sheet.on_open_border(c.at));
+            match (cusp.closed, c) {
+                (true, _) => CurveEnd::Loop,
+                (false, Some(c)) if !on_border => {
+                    let around = Rect::new(c.at, c.at);
+                    result.unresolved.push(open([around; 2], "a cusp edge could not be followed further"));
+                    CurveEnd::Unresolved
+                }
+                _ => CurveEnd::Boundary,
+            }
         });
+        let bound = bound * sheet.scale;
         result.curves.push(IntersectionCurve {
             kind: CurveKind::CuspEdge,
-            closed: false,
-            ends: [start, end],
+            closed: cusp.closed,
+            ends,
             end_ids: [None; 2],
             error_bound: bound,
             region: None,
             points,
         });
     }
-    for miter in &miters.points {
+    for (at, miter) in miters.points.iter().enumerate() {
         let quad = quad::quadrangle(&sheet, miter, radius);
+        if let (Some(record), Some(quad)) = (&mut record, quad) {
+            record.leaves.push(leaf::convert(&sheet, &lines, at, miter.at, quad, radius));
+        }
         result.miters.push(Miter {
             xyz: sheet.to_model(sheet.point(miter.at)),
             a: number,
@@ -217,7 +266,7 @@ pub fn self_intersect(
         result.unresolved.push(open(pair, reason));
     }
     result.unresolved.extend(found.open.iter().map(|(pair, reason)| open(*pair, reason)));
-    for area in region::regions(&sheet, &found.coincident) {
+    for area in region::regions(&sheet, &found.coincident, &found.folds, &miters.cusps) {
         let number = result.regions.len();
         let loops: Vec<Vec<CurvePoint>> =
             area.loops.iter().map(|l| l.iter().map(|&pair| assembler.point(pair)).collect()).collect();
@@ -233,8 +282,10 @@ pub fn self_intersect(
                 points: points.clone(),
             });
         }
-        result.regions.push(Region { boundary: loops, max_distance: distance });
-        if let Some(boxes) = area.boxes {
+        if !loops.is_empty() {
+            result.regions.push(Region { boundary: loops, max_distance: distance });
+        }
+        if let (true, Some(boxes)) = (area.rough, area.boxes) {
             result.unresolved.push(open(boxes, "the outline of a coincident region is known to within one cell only"));
         }
     }
@@ -250,7 +301,8 @@ pub fn self_intersect(
         miter_cells: miters.cells,
     };
     job.progress(1.0);
-    Ok(SelfIntersection { result, evidence })
+    let triple_points = triples.iter().map(|t| t.map(|p| sheet.to_surface(sheet.wrapped(p)))).collect();
+    Ok(SelfIntersection { result, triple_points, evidence, record })
 }
 
 fn same(sheet: &Sheet, a: DVec2, b: DVec2) -> bool {

@@ -1,15 +1,18 @@
 //! Coincident regions: areas over which the surface lies on itself, from the pairs of cells that coincide.
 //!
-//! Pairs that touch in both domains make one region, whichever of the two sides each names first. Its outline is that
-//! of the union of its cells on the first side, every corner matched with its closest point on the second; it is known
-//! to within one cell, which the result says.
+//! Pairs that touch in both domains make one region, whichever of the two sides each names first; folds beside them
+//! belong to it. Its outline comes from [`super::outline`] and must agree with the area of the cells; otherwise it is that
+//! of the union of the cells on the first side, every corner matched with its closest point on the second, known to within
+//! one cell, which the result says.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec2;
 
 use super::cover::{Coincidence, foot};
+use super::cusp::CuspEdge;
 use super::hull::Rect;
+use super::outline;
 use super::sheet::Sheet;
 
 /// One region.
@@ -21,15 +24,18 @@ pub(crate) struct Area {
     pub distance: f64,
     /// Boxes around the two sides.
     pub boxes: Option<[Rect; 2]>,
+    /// Whether the loops are the cells' outline only.
+    pub rough: bool,
 }
 
-/// Collects coincident pairs into regions.
-pub(crate) fn regions(sheet: &Sheet, pairs: &[Coincidence]) -> Vec<Area> {
+/// Collects coincident pairs and folds into regions. A fold without pairs beside it is an area without loops.
+pub(crate) fn regions(sheet: &Sheet, pairs: &[Coincidence], folds: &[(usize, Rect)], edges: &[CuspEdge]) -> Vec<Area> {
     let touch = |a: &Rect, b: &Rect| {
         let slack = DVec2::splat(1e-12);
         (a.low - slack).cmple(b.high).all() && (b.low - slack).cmple(a.high).all()
     };
     let mut waiting: Vec<Coincidence> = pairs.to_vec();
+    let mut left: Vec<(usize, Rect)> = folds.to_vec();
     let mut out = Vec::new();
     while let Some(first) = waiting.pop() {
         let mut group = vec![first];
@@ -49,7 +55,16 @@ pub(crate) fn regions(sheet: &Sheet, pairs: &[Coincidence]) -> Vec<Area> {
                 }
             });
         }
-        out.push(area(sheet, &group));
+        // All windows of an edge that touches the group.
+        let beside = |rect: &Rect| group.iter().any(|c| touch(&c.a, rect) || touch(&c.b, rect));
+        let mut numbers: Vec<usize> = left.iter().filter(|f| beside(&f.1)).map(|f| f.0).collect();
+        numbers.dedup();
+        let (own, others) = left.into_iter().partition(|f| numbers.contains(&f.0));
+        left = others;
+        out.push(area(sheet, &group, &own, edges));
+    }
+    for (_, rect) in left {
+        out.push(Area { boxes: Some([rect; 2]), rough: true, ..Area::default() });
     }
     // Where two sides meet (a fold), cells close to the fold can be named either way: the order must not depend on it.
     out.sort_by(|x, y| {
@@ -59,13 +74,22 @@ pub(crate) fn regions(sheet: &Sheet, pairs: &[Coincidence]) -> Vec<Area> {
     out
 }
 
-fn area(sheet: &Sheet, group: &[Coincidence]) -> Area {
+fn area(sheet: &Sheet, group: &[Coincidence], folds: &[(usize, Rect)], edges: &[CuspEdge]) -> Area {
     let mut result = Area::default();
     for c in group {
         let [a, b] = result.boxes.unwrap_or([c.a, c.b]);
         result.boxes = Some([a.union(&c.a), b.union(&c.b)]);
     }
-    for outline in outlines(&group.iter().map(|c| c.a).collect::<Vec<_>>()) {
+    let rough = outlines(&group.iter().map(|c| c.a).collect::<Vec<_>>());
+    let exact = outline::loops(sheet, group, folds, edges);
+    if agrees(&exact, &rough, group, folds) {
+        let apart = |&[p, q]: &[DVec2; 2]| sheet.point(p).distance(sheet.point(q));
+        result.distance = exact.iter().flatten().map(apart).fold(0.0, f64::max);
+        result.loops = exact;
+        return result;
+    }
+    result.rough = true;
+    for outline in rough {
         let mut matched = Vec::with_capacity(outline.len());
         for p in outline {
             // On a fold, where the two sides meet, a point is its own partner.
@@ -90,6 +114,19 @@ fn area(sheet: &Sheet, group: &[Coincidence]) -> Area {
         }
     }
     result
+}
+
+/// Whether exact loops enclose about what the cells cover: within two cells along the outline, and the folds.
+fn agrees(exact: &[Vec<[DVec2; 2]>], rough: &[Vec<DVec2>], group: &[Coincidence], folds: &[(usize, Rect)]) -> bool {
+    if exact.is_empty() {
+        return false;
+    }
+    let enclosed: f64 = exact.iter().map(|l| outline::area(l)).sum();
+    let covered: f64 = rough.iter().flat_map(|l| l.windows(2)).map(|s| 0.5 * s[0].perp_dot(s[1])).sum();
+    let around: f64 = rough.iter().flat_map(|l| l.windows(2)).map(|s| s[0].distance(s[1])).sum();
+    let cell = group.iter().map(|c| c.a.size().max_element()).fold(0.0, f64::max);
+    let strip: f64 = folds.iter().map(|f| f.1.size().element_product()).sum();
+    (enclosed - covered).abs() <= 2.0 * cell * around + strip
 }
 
 /// The outlines of a union of rectangles: closed loops, the first point repeated, interior on the left.

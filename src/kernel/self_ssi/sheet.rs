@@ -264,6 +264,23 @@ impl Sheet {
         DVec2::new(map(0, p.x), map(1, p.y))
     }
 
+    /// A rectangle as `[[u0, u1], [v0, v1]]` in the surface's parameters.
+    pub fn in_surface(&self, r: &Rect) -> [[f64; 2]; 2] {
+        let (low, high) = (self.to_surface(r.low), self.to_surface(r.high));
+        [[low.x, high.x], [low.y, high.y]]
+    }
+
+    /// The point of [0, 1]^2 for parameters of the surface.
+    pub fn from_surface(&self, p: DVec2) -> DVec2 {
+        let map = |d: usize, t: f64| (t - self.domain[d][0]) / (self.domain[d][1] - self.domain[d][0]);
+        DVec2::new(map(0, p.x), map(1, p.y))
+    }
+
+    /// Whether a point lies on a border that is no seam.
+    pub fn on_open_border(&self, p: DVec2) -> bool {
+        (0..2).any(|d| !self.periodic[d] && (p[d] == 0.0 || p[d] == 1.0))
+    }
+
     /// A point in model space.
     pub fn to_model(&self, x: DVec3) -> DVec3 {
         self.origin + x * self.scale

@@ -82,12 +82,13 @@ pub(crate) fn injective(frames: &[[DVec3; 2]]) -> bool {
 
 type Interval = [f64; 2];
 
-fn add(a: Interval, b: Interval) -> Interval {
+/// The sum of two intervals.
+pub(crate) fn add(a: Interval, b: Interval) -> Interval {
     [a[0] + b[0], a[1] + b[1]]
 }
 
 /// `a` times anything in -k..=k.
-fn swept(a: Interval, k: f64) -> Interval {
+pub(crate) fn swept(a: Interval, k: f64) -> Interval {
     let m = a[0].abs().max(a[1].abs()) * k;
     [-m, m]
 }
