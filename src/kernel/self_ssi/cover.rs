@@ -53,6 +53,12 @@ pub(crate) struct Coincidence {
     pub b: Rect,
 }
 
+impl Coincidence {
+    pub fn swapped(self) -> Self {
+        Self { a: self.b, b: self.a }
+    }
+}
+
 /// What the search found, beside the traces.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Cover {

@@ -52,6 +52,16 @@ impl CuspEdge {
     pub fn nodes(&self) -> &[CuspNode] {
         self.all.get(self.inside.clone()).unwrap_or(&[])
     }
+
+    /// On which side of the edge a point is, as its signed distance.
+    pub fn side_of(&self, p: DVec2) -> f64 {
+        let nodes = self.nodes();
+        let nearest = (0..nodes.len()).min_by(|&a, &b| nodes[a].at.distance(p).total_cmp(&nodes[b].at.distance(p)));
+        nearest.map_or(0.0, |k| {
+            let along = nodes[(k + 1).min(nodes.len() - 1)].at - nodes[k.saturating_sub(1)].at;
+            along.normalize_or_zero().perp_dot(p - nodes[k].at)
+        })
+    }
 }
 
 /// Follows zeros of the miter system along its kernel; `None` when there are none beside the first.
@@ -89,6 +99,9 @@ fn side(sheet: &Sheet, start: [f64; 3], along: DVec3, job: &Job) -> (Vec<CuspNod
         let out = |d: usize| !sheet.periodic[d] && !(0.0..=1.0).contains(&m[d]);
         if inside.is_none() && (out(0) || out(1)) {
             let border = on_border(sheet, y, n, z);
+            if nodes.last().is_some_and(|l| l.at.distance(border.truncate()) < 0.1 * STEP) {
+                nodes.pop();
+            }
             nodes.push(CuspNode { at: border.truncate().clamp(DVec2::ZERO, DVec2::ONE), phi: border.z });
             inside = Some(nodes.len());
         }

@@ -29,13 +29,23 @@ pub(crate) fn loops(
     folds: &[(usize, Rect)],
     edges: &[CuspEdge],
 ) -> Vec<Vec<Pair>> {
-    let finder = Finder { sheet, cells, folds, edges, gap: 1e-11_f64.max(8.0 * sheet.rounding) };
+    let first_side = edges
+        .iter()
+        .map(|edge| {
+            let sides = cells.iter().map(|c| edge.side_of(c.a.center()));
+            sides.min_by(|a, b| a.abs().total_cmp(&b.abs())).map(|side| side > 0.0)
+        })
+        .collect();
+    let finder = Finder { sheet, cells, folds, edges, first_side, gap: 1e-11_f64.max(8.0 * sheet.rounding) };
     let mut pieces = Vec::new();
     for d in 0..2 {
         for (side, end) in [0.0, 1.0].into_iter().enumerate() {
             if !sheet.periodic[d] && !sheet.poles[d][side] {
                 pieces.extend(finder.border(d, end));
             }
+        }
+        if sheet.periodic[d] {
+            pieces.extend(finder.seam(d));
         }
     }
     let mut kept: Vec<Vec<Pair>> = Vec::new();
@@ -71,6 +81,8 @@ struct Finder<'a> {
     cells: &'a [Coincidence],
     folds: &'a [(usize, Rect)],
     edges: &'a [CuspEdge],
+    /// For each edge, whether the first sides of the cells are on its positive side.
+    first_side: Vec<Option<bool>>,
     gap: f64,
 }
 
@@ -81,28 +93,25 @@ impl Finder<'_> {
     /// The partners of a point that the cells and folds know of.
     fn partners(&self, p: DVec2) -> Vec<Partner> {
         let mut out: Vec<Partner> = Vec::new();
-        let mut add = |found: Option<DVec2>, first: bool| {
+        let add = |out: &mut Vec<Partner>, found: Option<DVec2>, first: bool| {
             if let Some(q) = found
                 && !out.iter().any(|(k, f)| *f == first && k.distance(q) < 1e-7)
             {
                 out.push((q, first));
             }
         };
-        for (number, rect) in self.folds {
-            if rect.grown(0.25).contains(p)
-                && let Some((node, r)) = self.across(*number, p)
-            {
-                let q = p - DVec2::from_angle(node.phi) * (2.0 * r);
-                let first = self.first_side(*number).is_none_or(|s| s == (self.side_of(*number, p) > 0.0));
-                add(self.partner(p, q), first);
-            }
+        if let Some((number, _)) = self.folds.iter().find(|f| f.1.grown(0.25).contains(p))
+            && let Some((node, r)) = self.across(*number, p)
+        {
+            let found = self.partner(p, p - DVec2::from_angle(node.phi) * (2.0 * r));
+            add(&mut out, found, self.is_first(p).unwrap_or(true));
         }
         for c in self.cells {
-            if c.a.grown(0.1).contains(p) {
-                add(self.partner(p, c.b.center()), true);
-            }
-            if c.b.grown(0.1).contains(p) {
-                add(self.partner(p, c.a.center()), false);
+            for (own, other, first) in [(&c.a, &c.b, true), (&c.b, &c.a, false)] {
+                let known = |out: &[Partner]| out.iter().any(|(q, f)| *f == first && other.grown(1.0).contains(*q));
+                if own.grown(0.1).contains(p) && !known(&out) {
+                    add(&mut out, self.partner(p, other.center()), first);
+                }
             }
         }
         out
@@ -118,23 +127,10 @@ impl Finder<'_> {
         r.is_finite().then_some((nodes[at], r))
     }
 
-    /// On which side of an edge a point is, as its signed distance.
-    fn side_of(&self, number: usize, p: DVec2) -> f64 {
-        let nodes = self.edges.get(number).map_or(&[][..], CuspEdge::nodes);
-        let at = (1..nodes.len()).min_by(|&a, &b| {
-            let middle = |k: usize| (nodes[k].at + nodes[k - 1].at) * 0.5;
-            middle(a).distance(p).total_cmp(&middle(b).distance(p))
-        });
-        at.map_or(0.0, |k| (nodes[k].at - nodes[k - 1].at).normalize_or_zero().perp_dot(p - nodes[k].at))
-    }
-
-    /// Whether the first sides of the cells are on the positive side of an edge.
-    fn first_side(&self, number: usize) -> Option<bool> {
-        let cell = self.cells.iter().min_by(|x, y| {
-            let far = |c: &Coincidence| self.side_of(number, c.a.center()).abs();
-            far(x).total_cmp(&far(y))
-        })?;
-        Some(self.side_of(number, cell.a.center()) > 0.0)
+    /// Whether a point is on the first side, as far as a fold beside it tells.
+    fn is_first(&self, p: DVec2) -> Option<bool> {
+        let (number, _) = self.folds.iter().find(|f| f.1.grown(0.25).contains(p))?;
+        Some((*self.first_side.get(*number)?)? == (self.edges.get(*number)?.side_of(p) > 0.0))
     }
 
     /// The partner of a point close to a guess, if it lies in the domain.
@@ -142,8 +138,8 @@ impl Finder<'_> {
         let sheet = self.sheet;
         let mut q = guess;
         for _ in 0..25 {
-            let turned = q + turns(sheet, p, q);
-            let d = p - turned;
+            // Across a seam the direct form: the surface may have a kink there.
+            let d = p - q;
             let step = if d.length() < 0.2 && d.length() > 0.0 {
                 // F(m, phi, r) with p = m + r e held.
                 let (r, phi) = (0.5 * d.length(), d.to_angle());
@@ -172,6 +168,48 @@ impl Finder<'_> {
         (inside && apart <= self.gap && p.distance(q) > 1e-12).then_some(q)
     }
 
+    /// The stretches of a seam at which the surface is folded: both sides of it coincide, and are one point on it.
+    fn seam(&self, d: usize) -> Vec<Vec<Pair>> {
+        const BESIDE: f64 = 1e-3;
+        let at = |s: f64, t: f64| {
+            let mut p = DVec2::splat(s);
+            p[1 - d] = t;
+            p
+        };
+        let folded = |t: f64| {
+            let found = self.partner(at(1.0 - BESIDE, t), at(BESIDE, t));
+            found.is_some_and(|q| q[d] > 0.0 && q[d] < 20.0 * BESIDE)
+        };
+        // The first side is where the cells beside the seam say.
+        let first_high = self.cells.iter().any(|c| c.a.high[d] > 1.0 - 1e-9 && c.b.low[d] < 1e-9);
+        let pair = |t: f64| if first_high { [at(1.0, t), at(0.0, t)] } else { [at(0.0, t), at(1.0, t)] };
+        let edge = |mut inside: f64, mut outside: f64| {
+            for _ in 0..60 {
+                let middle = 0.5 * (inside + outside);
+                if folded(middle) { inside = middle } else { outside = middle }
+            }
+            pair(inside)
+        };
+        let mut out: Vec<Vec<Pair>> = Vec::new();
+        let mut line: Vec<Pair> = Vec::new();
+        let step = 1.0 / SAMPLES as f64;
+        for k in 0..=SAMPLES {
+            let t = k as f64 * step;
+            if folded(t) {
+                if line.is_empty() && k > 0 {
+                    line.push(edge(t, t - step));
+                }
+                line.push(pair(t));
+            } else if !line.is_empty() {
+                line.push(edge(t - step, t));
+                out.push(std::mem::take(&mut line));
+            }
+        }
+        out.push(line);
+        out.retain(|l| l.len() > 1);
+        out
+    }
+
     /// The stretches of one border on which the surface lies on itself.
     fn border(&self, d: usize, end: f64) -> Vec<Vec<Pair>> {
         let at = |t: f64| {
@@ -183,12 +221,7 @@ impl Finder<'_> {
         let follow = |t: f64, (guess, first): Partner| -> Option<Partner> {
             let p = at(t);
             let q = self.partner(p, guess)?;
-            let side = self
-                .folds
-                .iter()
-                .find(|f| f.1.grown(0.25).contains(p))
-                .and_then(|f| self.first_side(f.0).map(|s| s == (self.side_of(f.0, p) > 0.0)));
-            (side.is_none_or(|s| s == first) && q.distance(guess) < 0.1).then_some((q, first))
+            (self.is_first(p).is_none_or(|s| s == first) && q.distance(guess) < 0.1).then_some((q, first))
         };
         let pair = |t: f64, (q, first): Partner| if first { [at(t), q] } else { [q, at(t)] };
         let edge = |mut inside: f64, mut outside: f64, mut known: Partner| {

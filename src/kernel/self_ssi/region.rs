@@ -39,6 +39,7 @@ pub(crate) fn regions(sheet: &Sheet, pairs: &[Coincidence], folds: &[(usize, Rec
     let mut out = Vec::new();
     while let Some(first) = waiting.pop() {
         let mut group = vec![first];
+        let mut own: Vec<(usize, Rect)> = Vec::new();
         let mut at = 0;
         while at < group.len() {
             let here = group[at];
@@ -48,19 +49,31 @@ pub(crate) fn regions(sheet: &Sheet, pairs: &[Coincidence], folds: &[(usize, Rec
                     group.push(*other);
                     false
                 } else if touch(&here.a, &other.b) && touch(&here.b, &other.a) {
-                    group.push(Coincidence { a: other.b, b: other.a });
+                    group.push(other.swapped());
                     false
                 } else {
                     true
                 }
             });
+            if at < group.len() {
+                continue;
+            }
+            // All windows of a fold beside the group belong to it, and with them the pairs beside these.
+            let beside = |rect: &Rect| group.iter().any(|c| touch(&c.a, rect) || touch(&c.b, rect));
+            let Some(number) = left.iter().find(|f| beside(&f.1)).map(|f| f.0) else { continue };
+            let (windows, others): (Vec<_>, Vec<_>) = left.into_iter().partition(|f| f.0 == number);
+            left = others;
+            let side = |c: &Coincidence| edges.get(number).is_some_and(|e| e.side_of(c.a.center()) > 0.0);
+            let first = side(&group[0]);
+            waiting.retain(|other| {
+                let joins = windows.iter().any(|(_, rect)| touch(&other.a, rect) || touch(&other.b, rect));
+                if joins {
+                    group.push(if side(other) == first { *other } else { other.swapped() });
+                }
+                !joins
+            });
+            own.extend(windows);
         }
-        // All windows of an edge that touches the group.
-        let beside = |rect: &Rect| group.iter().any(|c| touch(&c.a, rect) || touch(&c.b, rect));
-        let mut numbers: Vec<usize> = left.iter().filter(|f| beside(&f.1)).map(|f| f.0).collect();
-        numbers.dedup();
-        let (own, others) = left.into_iter().partition(|f| numbers.contains(&f.0));
-        left = others;
         out.push(area(sheet, &group, &own, edges));
     }
     for (_, rect) in left {
