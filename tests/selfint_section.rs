@@ -168,7 +168,8 @@ fn the_record_shows_what_was_proved_and_where_the_miter_points_are() {
     // The first split: 48 | 48 | 48 of 128 cells, the middle one over both sides.
     let mut widths: Vec<[u32; 2]> = record.level(1).filter_map(|n| n.cells).map(|c| c[0]).collect();
     let mut heights: Vec<[u32; 2]> = record.level(1).filter_map(|n| n.cells).map(|c| c[1]).collect();
-    (widths.sort_unstable(), heights.sort_unstable());
+    widths.sort_unstable();
+    heights.sort_unstable();
     let expected = vec![[0, 48], [40, 88], [80, 128]];
     assert!(widths == expected || heights == expected, "{widths:?} {heights:?}");
     // Windows around the miter points need no proof of their own: their branch is known. None else fails.

@@ -128,25 +128,21 @@ fn graphs(height: &Height, window: &Rect, gap: f64, out: &mut Contour, job: &Job
         }
         let signed = |[a, b]: [f64; 2]| a > 0.0 || b < 0.0;
         let (du, dv) = (signed(range(n, &hull.du)), signed(range(n, &hull.dv)));
-        if (du && dv)
-            || (du && edges_clear(height, &rect, &hull.pos, 0))
-            || (dv && edges_clear(height, &rect, &hull.pos, 1))
-        {
-            seeds.extend(seeds_of(height, &rect, if dv { 1 } else { 0 }));
+        let graph = |has_sign: bool, d: usize| has_sign && edges_clear(height, &hull.pos, d);
+        if (du && dv) || graph(du, 0) || graph(dv, 1) {
+            seeds.extend(seeds_of(height, &rect, usize::from(dv)));
             continue;
         }
-        if !(du || dv)
+        let singular = !du && !dv;
+        if singular
             && let Some(c) = critical(height, &rect, gap)
+            && !out.critical.iter().any(|k| k.distance(c) < disc)
         {
-            if !out.critical.iter().any(|k| k.distance(c) < disc) {
-                out.critical.push(c);
-            }
+            out.critical.push(c);
         }
         let size = rect.size();
         if size.max_element() < smallest {
-            if !(du || dv) {
-                out.open += 1;
-            }
+            out.open += usize::from(singular);
             continue;
         }
         let d = usize::from(size.y > size.x);
@@ -176,7 +172,7 @@ fn pieces_of(sheet: &Sheet, window: &Rect) -> Vec<Rect> {
 }
 
 /// Whether both edges across direction `d` are clear of the level: by their control points.
-fn edges_clear(height: &Height, _rect: &Rect, pos: &[DVec3], d: usize) -> bool {
+fn edges_clear(height: &Height, pos: &[DVec3], d: usize) -> bool {
     let [p, q] = height.sheet.degree;
     let (width, rows) = (p + 1, q + 1);
     if pos.len() != width * rows {

@@ -135,7 +135,7 @@ pub fn miter_section(
     }
     let tolerances = Tolerances::of(&surface.bounds());
     let sheet = Sheet::new(surface, tolerances.gap);
-    let miter = miter::polished(&sheet, sheet.from_surface(at)).ok_or(SelfIntersectError::NoMiterPoint { at })?;
+    let miter = miter::polished(&sheet, sheet.in_unit(at)).ok_or(SelfIntersectError::NoMiterPoint { at })?;
     let frame = Frame::of(&miter);
     let normal = match options.normal {
         None => frame.normal(options.tilt),

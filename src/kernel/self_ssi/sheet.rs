@@ -271,7 +271,7 @@ impl Sheet {
     }
 
     /// The point of [0, 1]^2 for parameters of the surface.
-    pub fn from_surface(&self, p: DVec2) -> DVec2 {
+    pub fn in_unit(&self, p: DVec2) -> DVec2 {
         let map = |d: usize, t: f64| (t - self.domain[d][0]) / (self.domain[d][1] - self.domain[d][0]);
         DVec2::new(map(0, p.x), map(1, p.y))
     }
