@@ -341,3 +341,60 @@ fn a_triangulation_finds_nothing_that_is_missing() {
     }
     assert!(met > 100, "the trials hardly meet themselves: {met}");
 }
+
+/// The Steiner surface (Y Z, X Z, X Y) for three lines X, Y, Z of the domain: its double curve is the three lines, the
+/// triple point is in the corners of their triangle, and each line has a miter point halfway between two corners.
+fn steiner(corners: [DVec2; 3], degree: usize) -> Surface {
+    let line = |a: DVec2, b: DVec2, c: DVec2, p: DVec2| (b - a).perp_dot(p - a) / (b - a).perp_dot(c - a);
+    let [a, b, c] = corners;
+    let k = Knots::bezier(degree, -1.0, 1.0).unwrap();
+    interpolate(&k, &k, |u, v| {
+        let p = DVec2::new(u, v);
+        let (x, y, z) = (line(a, b, c, p), line(b, c, a, p), line(c, a, b, p));
+        turned(DVec3::new(y * z, x * z, x * y))
+    })
+}
+
+#[test]
+fn three_sheets_meet_in_a_triple_point() {
+    for corners in [
+        [DVec2::new(-0.5, -0.4), DVec2::new(0.6, -0.3), DVec2::new(0.1, 0.5)],
+        [DVec2::new(-0.71, 0.3), DVec2::new(-0.2, -0.63), DVec2::new(0.43, 0.21)],
+    ] {
+        for degree in [2, 3] {
+            let surface = steiner(corners, degree);
+            let found = solve("Steiner", &surface);
+            let r = &found.result;
+            assert!(r.complete);
+            assert_eq!((r.miters.len(), r.junctions.len(), found.triple_points.len()), (3, 1, 1));
+            for corner in corners {
+                let near = found.triple_points[0].iter().map(|p| p.distance(corner)).fold(f64::INFINITY, f64::min);
+                assert!(near < 1e-9, "{corner}: {near}");
+            }
+            assert!(r.junctions[0].xyz.distance(turned(DVec3::ZERO)) < 1e-12);
+            // Each of the three branches is cut there: miter point to triple point, triple point to border.
+            let mut ends: Vec<[CurveEnd; 2]> = curves(&found).iter().map(|c| c.ends).collect();
+            for e in &mut ends {
+                e.sort_by_key(|k| *k as u8);
+            }
+            let count = |e: [CurveEnd; 2]| ends.iter().filter(|x| **x == e).count();
+            assert_eq!(count([CurveEnd::Junction, CurveEnd::Miter]), 3);
+            assert_eq!(count([CurveEnd::Boundary, CurveEnd::Junction]), 3);
+            assert_eq!(ends.len(), 6);
+            for c in curves(&found) {
+                for p in &c.points {
+                    let on = |k: usize, p: DVec2| {
+                        let (a, b) = (corners[k], corners[(k + 1) % 3]);
+                        ((b - a).perp_dot(p - a) / (b - a).length()).abs() < 1e-9
+                    };
+                    assert!((0..3).any(|k| on(k, p.uv) && on(k, p.st)), "{} {}", p.uv, p.st);
+                }
+                for (end, id) in [(c.points.first(), 0), (c.points.last(), 1)] {
+                    if c.ends[id] == CurveEnd::Junction {
+                        assert!(end.unwrap().xyz.distance(r.junctions[0].xyz) < 1e-12 && c.end_ids[id] == Some(0));
+                    }
+                }
+            }
+        }
+    }
+}
