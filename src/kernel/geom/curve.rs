@@ -4,7 +4,7 @@ use glam::{DAffine3, DVec3, DVec4};
 
 use super::Aabb;
 use super::blossom;
-use super::knots::{KnotError, Knots};
+use super::knots::{KnotError, Knots, MAX_DEGREE};
 
 /// Why numbers are no curve.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -168,7 +168,16 @@ impl Curve {
 
     /// The point and its derivatives up to `order <= 3` at `t`; entries above `order` are zero.
     pub fn derivatives(&self, t: f64, order: usize) -> [DVec3; 4] {
-        let basis = self.knots.basis(t, order);
+        match self.knots.degree() {
+            0..=3 => self.small_derivatives::<4>(t, order),
+            4..=7 => self.small_derivatives::<8>(t, order),
+            _ => self.small_derivatives::<{ MAX_DEGREE + 1 }>(t, order),
+        }
+    }
+
+    #[inline]
+    fn small_derivatives<const N: usize>(&self, t: f64, order: usize) -> [DVec3; 4] {
+        let basis = self.knots.small_basis::<N>(self.knots.span(t), t, order);
         let p = self.knots.degree();
         let mut out = [DVec3::ZERO; 4];
         let Some(weights) = &self.weights else {

@@ -1,7 +1,7 @@
 //! Knot vectors and B-spline basis functions with their derivatives.
 //!
-//! The basis follows Piegl and Tiller, *The NURBS Book* (1997), A2.1 and A2.3, on the stack. Cost: O(p^2) a
-//! value, O(p^2 k) with k derivatives.
+//! The basis follows Piegl and Tiller, *The NURBS Book* (1997), A2.1 and A2.3, on the stack; the cubic is written
+//! out. Cost: O(p^2) a value, O(p^2 k) with k derivatives.
 
 /// The largest degree that is accepted. Files of the field reach 22.
 pub const MAX_DEGREE: usize = 31;
@@ -92,13 +92,13 @@ impl TryFrom<RawKnots> for Knots {
 }
 
 /// Basis values at a parameter: `d[k][i]` is the k-th derivative of the basis function of control point
-/// `first + i`, for `i <= degree`.
+/// `first + i`, for `i <= degree`. N is above the degree; the default holds any.
 #[derive(Clone, Copy, Debug)]
-pub struct Basis {
+pub struct Basis<const N: usize = { MAX_DEGREE + 1 }> {
     /// The first control point with a non-zero basis function.
     pub first: usize,
     /// Values and derivatives.
-    pub d: [[f64; MAX_DEGREE + 1]; MAX_DERIVATIVE + 1],
+    pub d: [[f64; N]; MAX_DERIVATIVE + 1],
 }
 
 impl Knots {
@@ -214,15 +214,63 @@ impl Knots {
 
     /// The same on the polynomial piece of a given non-empty span, whichever side of it `t` is on.
     pub fn basis_on(&self, span: usize, t: f64, order: usize) -> Basis {
-        // The work space is as large as the degree asks for: clearing that of degree 31 costs more than all of a cubic.
+        fn widened<const N: usize>(small: &Basis<N>) -> Basis {
+            let mut basis = Basis { first: small.first, d: [[0.0; MAX_DEGREE + 1]; MAX_DERIVATIVE + 1] };
+            for (wide, row) in basis.d.iter_mut().zip(&small.d) {
+                wide[..N].copy_from_slice(row);
+            }
+            basis
+        }
         match self.degree {
-            0..=3 => self.basis_in::<4>(span, t, order),
-            4..=7 => self.basis_in::<8>(span, t, order),
-            _ => self.basis_in::<{ MAX_DEGREE + 1 }>(span, t, order),
+            0..=3 => widened(&self.small_basis::<4>(span, t, order)),
+            4..=7 => widened(&self.small_basis::<8>(span, t, order)),
+            _ => self.small_basis(span, t, order),
         }
     }
 
-    fn basis_in<const N: usize>(&self, span: usize, t: f64, order: usize) -> Basis {
+    /// The same in no more room than a degree below `N` needs: clearing that of degree 31 costs more than all of a
+    /// cubic. The degree must be below `N`.
+    #[inline]
+    pub(crate) fn small_basis<const N: usize>(&self, span: usize, t: f64, order: usize) -> Basis<N> {
+        if self.degree == 3 { self.cubic(span, t, order) } else { self.general(span, t, order) }
+    }
+
+    /// The cubic written out: each derivative is a difference of the basis one degree lower over its knots.
+    #[inline]
+    fn cubic<const N: usize>(&self, span: usize, t: f64, order: usize) -> Basis<N> {
+        let mut basis = Basis { first: span - 3, d: [[0.0; N]; MAX_DERIVATIVE + 1] };
+        let &[u1, u2, u3, v1, v2, v3] = &self.values[span - 2..span + 4] else { return basis };
+        let [left1, left2, left3] = [t - u3, t - u2, t - u1];
+        let [right1, right2, right3] = [v1 - t, v2 - t, v3 - t];
+        let step = v1 - u3;
+        let one = [right1 / step, left1 / step];
+        let below1 = [one[0] / (v1 - u2), one[1] / (v2 - u3)];
+        let two = [below1[0] * right1, below1[0] * left2 + below1[1] * right2, below1[1] * left1];
+        let below2 = [two[0] / (v1 - u1), two[1] / (v2 - u2), two[2] / (v3 - u3)];
+        let d = &mut basis.d;
+        d[0][0] = below2[0] * right1;
+        d[0][1] = below2[0] * left3 + below2[1] * right2;
+        d[0][2] = below2[1] * left2 + below2[2] * right3;
+        d[0][3] = below2[2] * left1;
+        let differences = |row: &mut [f64; N], [a, b, c]: [f64; 3], factor: f64| {
+            (row[0], row[1], row[2], row[3]) = (-factor * a, factor * (a - b), factor * (b - c), factor * c);
+        };
+        if order >= 1 {
+            differences(&mut d[1], below2, 3.0);
+        }
+        let over = |[a, b, c]: [f64; 3]| [a / (v1 - u1), b / (v2 - u2), c / (v3 - u3)];
+        if order >= 2 {
+            let [a, b] = below1;
+            differences(&mut d[2], over([-a, a - b, b]), 6.0);
+        }
+        if order >= 3 {
+            let (a, b) = (-1.0 / (step * (v1 - u2)), 1.0 / (step * (v2 - u3)));
+            differences(&mut d[3], over([-a, a - b, b]), 6.0);
+        }
+        basis
+    }
+
+    fn general<const N: usize>(&self, span: usize, t: f64, order: usize) -> Basis<N> {
         let (p, u) = (self.degree, &self.values);
         let mut ndu = [[0.0; N]; N];
         let (mut left, mut right) = ([0.0; N], [0.0; N]);
@@ -239,7 +287,7 @@ impl Knots {
             }
             ndu[j][j] = saved;
         }
-        let mut d = [[0.0; MAX_DEGREE + 1]; MAX_DERIVATIVE + 1];
+        let mut d = [[0.0; N]; MAX_DERIVATIVE + 1];
         for j in 0..=p {
             d[0][j] = ndu[j][p];
         }
@@ -367,6 +415,23 @@ mod tests {
         for (k, row) in expected.iter().enumerate() {
             for (i, value) in row.iter().enumerate() {
                 assert!((basis.d[k][i] - value).abs() < 1e-15);
+            }
+        }
+    }
+
+    #[test]
+    fn the_cubic_is_the_general_one() {
+        let knots = Knots::new(3, vec![-0.5, 0.0, 0.0, 0.2, 1.0, 1.0, 1.0, 2.5, 2.6, 3.5, 3.5, 4.0]).unwrap();
+        let [a, b] = knots.domain();
+        for i in 0..=60 {
+            let t = a - 0.1 + (b - a + 0.2) * f64::from(i) / 60.0;
+            for order in 0..=3 {
+                let (fast, slow): (Basis<4>, Basis<4>) =
+                    (knots.cubic(knots.span(t), t, order), knots.general(knots.span(t), t, order));
+                assert_eq!(fast.first, slow.first);
+                for (x, y) in fast.d.as_flattened().iter().zip(slow.d.as_flattened()) {
+                    assert!((x - y).abs() <= 1e-13 * (1.0 + y.abs()), "{t} {order}");
+                }
             }
         }
     }

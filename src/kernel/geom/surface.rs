@@ -4,7 +4,7 @@ use glam::{DAffine3, DVec2, DVec3, DVec4};
 
 use super::blossom;
 use super::curve::{cartesian, checked_weights, homogeneous};
-use super::knots::{Basis, KnotError, Knots};
+use super::knots::{Basis, KnotError, Knots, MAX_DEGREE};
 use super::{Aabb, BezierPatch, Curve, CurveError};
 
 /// One of the two parameter directions.
@@ -234,31 +234,62 @@ impl Surface {
 
     /// The point and its partial derivatives up to `order <= 3` at `uv`.
     pub fn jet(&self, uv: DVec2, order: usize) -> SurfaceJet {
-        self.jet_from(&self.knots[0].basis(uv.x, order), &self.knots[1].basis(uv.y, order), order)
+        match self.knots[0].degree().max(self.knots[1].degree()) {
+            0..=3 => self.small_jet::<4>(uv, order),
+            4..=7 => self.small_jet::<8>(uv, order),
+            _ => self.small_jet::<{ MAX_DEGREE + 1 }>(uv, order),
+        }
+    }
+
+    #[inline]
+    fn small_jet<const N: usize>(&self, uv: DVec2, order: usize) -> SurfaceJet {
+        let [u, v] = &self.knots;
+        let bu = u.small_basis::<N>(u.span(uv.x), uv.x, order);
+        let bv = v.small_basis::<N>(v.span(uv.y), uv.y, order);
+        self.jet_from(&bu, &bv, order)
     }
 
     /// The same from basis values that the caller has tabulated (a grid needs each only once).
-    pub fn jet_from(&self, bu: &Basis, bv: &Basis, order: usize) -> SurfaceJet {
-        let (p, q, nu) = (self.knots[0].degree(), self.knots[1].degree(), self.counts()[0]);
-        let order = order.min(3);
+    pub fn jet_from<const N: usize>(&self, bu: &Basis<N>, bv: &Basis<N>, order: usize) -> SurfaceJet {
+        // Constant orders and degrees let the loops unroll.
+        match (order, self.knots.each_ref().map(Knots::degree)) {
+            (0, [3, 3]) => self.summed(bu, bv, 0, [3, 3]),
+            (1, [3, 3]) => self.summed(bu, bv, 1, [3, 3]),
+            (2, [3, 3]) => self.summed(bu, bv, 2, [3, 3]),
+            (_, degree) => self.summed(bu, bv, order.min(3), degree),
+        }
+    }
+
+    #[inline(always)]
+    fn summed<const N: usize>(&self, bu: &Basis<N>, bv: &Basis<N>, order: usize, [p, q]: [usize; 2]) -> SurfaceJet {
+        let nu = self.counts()[0];
+        let mut jet = SurfaceJet::default();
+        let Some(weights) = &self.weights else {
+            for j in 0..=q {
+                let start = (bv.first + j) * nu + bu.first;
+                let mut along_u = [DVec3::ZERO; 4];
+                for (i, point) in self.points[start..=start + p].iter().enumerate() {
+                    for (k, sum) in along_u.iter_mut().enumerate().take(order + 1) {
+                        *sum += *point * bu.d[k][i];
+                    }
+                }
+                for k in 0..=order {
+                    for l in 0..=order - k {
+                        jet.d[k][l] += along_u[k] * bv.d[l][j];
+                    }
+                }
+            }
+            return jet;
+        };
         let mut a = [[DVec4::ZERO; 4]; 4];
         for j in 0..=q {
             let start = (bv.first + j) * nu + bu.first;
-            let row = &self.points[start..=start + p];
+            let row = self.points[start..=start + p].iter().zip(&weights[start..=start + p]);
             let mut along_u = [DVec4::ZERO; 4];
-            if let Some(weights) = &self.weights {
-                for (i, (point, &w)) in row.iter().zip(&weights[start..=start + p]).enumerate() {
-                    let h = (*point * w).extend(w);
-                    for (k, sum) in along_u.iter_mut().enumerate().take(order + 1) {
-                        *sum += h * bu.d[k][i];
-                    }
-                }
-            } else {
-                for (i, point) in row.iter().enumerate() {
-                    let h = point.extend(0.0);
-                    for (k, sum) in along_u.iter_mut().enumerate().take(order + 1) {
-                        *sum += h * bu.d[k][i];
-                    }
+            for (i, (point, &w)) in row.enumerate() {
+                let h = (*point * w).extend(w);
+                for (k, sum) in along_u.iter_mut().enumerate().take(order + 1) {
+                    *sum += h * bu.d[k][i];
                 }
             }
             for k in 0..=order {
@@ -267,15 +298,12 @@ impl Surface {
                 }
             }
         }
-        let mut jet = SurfaceJet::default();
         for k in 0..=order {
             for l in 0..=order - k {
                 jet.d[k][l] = a[k][l].truncate();
             }
         }
-        if self.weights.is_some() {
-            divide_by_weight(&mut jet, &a, order);
-        }
+        divide_by_weight(&mut jet, &a, order);
         jet
     }
 
