@@ -138,6 +138,8 @@ mod tests {
         assert!((arc.length() - std::f64::consts::FRAC_PI_2).abs() < 1e-11);
         for i in 0..=30 {
             let f = f64::from(i) / 30.0;
+            let t = arc.parameter_at(&c, f * arc.length());
+            assert!((arc.length_at(&c, t) - f * arc.length()).abs() < 1e-13);
             let p = arc.point(&c, f);
             assert!((p.y.atan2(p.x) - f * std::f64::consts::FRAC_PI_2).abs() < 1e-11, "{f}");
         }

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::grid::Grid;
 use super::project::{Sample, Status};
 use super::side::SideCurve;
-use crate::kernel::geom::Surface;
+use crate::kernel::geom::{Basis, Knots, Surface};
 use crate::kernel::job::Job;
 use crate::kernel::mesh::surface_set::{Scratch, SurfaceSet};
 
@@ -89,21 +89,41 @@ pub struct Reference<'a> {
     pub tol: f64,
 }
 
+/// Where check points lie in a span: at its start, in its middle, at its two Gauss points.
+fn places() -> [f64; 4] {
+    let g = 0.5 / 3f64.sqrt();
+    [0.0, 0.5, 0.5 - g, 0.5 + g]
+}
+
+/// The basis functions of one direction at the places of every span.
+fn tabulated(knots: &Knots, spans: usize) -> Vec<[(f64, Basis); 4]> {
+    let at = |k: usize, place: f64| (k as f64 + place) / spans as f64;
+    (0..=spans).map(|k| places().map(|place| (at(k, place), knots.basis(at(k, place), 0)))).collect()
+}
+
+/// What one row of cells is measured with.
+struct Row<'a> {
+    surface: &'a Surface,
+    reference: &'a Reference<'a>,
+    u: &'a [[(f64, Basis); 4]],
+    v: &'a [(f64, Basis); 4],
+    j: usize,
+    scratch: Scratch,
+    out: Vec<Check>,
+}
+
 /// Measures a patch whose knots are uniform with the samples at them.
 pub fn measure(surface: &Surface, reference: &Reference, job: &Job) -> Deviation {
     let (m, n) = (reference.samples.m(), reference.samples.n());
+    let (u, v) = (tabulated(&surface.knots()[0], m), tabulated(&surface.knots()[1], n));
     let rows: Vec<Vec<Check>> = (0..=n)
         .into_par_iter()
         .map(|j| {
-            let mut scratch = Scratch::default();
-            let mut row = Vec::new();
-            if job.is_cancelled() {
-                return row;
+            let mut row = Row { surface, reference, u: &u, v: &v[j], j, scratch: Scratch::default(), out: Vec::new() };
+            if !job.is_cancelled() {
+                (0..=m).for_each(|i| row.cell(i));
             }
-            for i in 0..=m {
-                cell(surface, reference, i, j, &mut scratch, &mut row);
-            }
-            row
+            row.out
         })
         .collect();
     let mut out = Deviation { incomplete: job.is_cancelled(), ..Deviation::default() };
@@ -127,58 +147,82 @@ pub fn measure(surface: &Surface, reference: &Reference, job: &Job) -> Deviation
     out
 }
 
-/// The check points that belong to the sample (i, j): e and f after it, g and the Gauss points of its piece.
-fn cell(surface: &Surface, r: &Reference, i: usize, j: usize, scratch: &mut Scratch, out: &mut Vec<Check>) {
-    let (m, n) = (r.samples.m(), r.samples.n());
-    let at = |a: f64, b: f64| DVec2::new((i as f64 + a) / m as f64, (j as f64 + b) / n as f64);
-    let on = |a: usize, b: usize| r.samples[(i + a, j + b)].status.is_projected();
-    let mut add = |kind, uv, corners: bool, side: Option<(usize, f64)>| {
-        out.push(check(surface, r, kind, uv, corners, side, scratch));
-    };
-    if i < m {
-        let side = if j == 0 { Some(0) } else { (j == n).then_some(2) };
-        add(Kind::E, at(0.5, 0.0), on(0, 0) && on(1, 0), side.map(|s| (s, at(0.5, 0.0).x)));
-    }
-    if j < n {
-        let side = if i == 0 { Some(3) } else { (i == m).then_some(1) };
-        add(Kind::F, at(0.0, 0.5), on(0, 0) && on(0, 1), side.map(|s| (s, at(0.0, 0.5).y)));
-    }
-    if i < m && j < n {
-        let corners = on(0, 0) && on(1, 0) && on(0, 1) && on(1, 1);
-        add(Kind::G, at(0.5, 0.5), corners, None);
-        let g = 0.5 / 3f64.sqrt();
-        for (a, b) in [(-g, -g), (g, -g), (-g, g), (g, g)] {
-            add(Kind::Gauss, at(0.5 + a, 0.5 + b), corners, None);
+impl Row<'_> {
+    /// The check points that belong to the sample (i, j): e and f after it, g and the Gauss points of its piece.
+    fn cell(&mut self, i: usize) {
+        let samples = self.reference.samples;
+        let (m, n, j) = (samples.m(), samples.n(), self.j);
+        if i < m {
+            let side = if j == 0 { Some(0) } else { (j == n).then_some(2) };
+            self.check(Kind::E, i, [1, 0], side.map(|s| (s, self.u[i][1].0)));
         }
+        if j < n {
+            let side = if i == 0 { Some(3) } else { (i == m).then_some(1) };
+            self.check(Kind::F, i, [0, 1], side.map(|s| (s, self.v[1].0)));
+        }
+        if i < m && j < n {
+            self.check(Kind::G, i, [1, 1], None);
+            for place in [[2, 2], [3, 2], [2, 3], [3, 3]] {
+                self.check(Kind::Gauss, i, place, None);
+            }
+        }
+    }
+
+    /// Measures the point at places of the spans behind the sample (i, j). `side` is the side that it lies on and
+    /// where.
+    fn check(&mut self, kind: Kind, i: usize, place: [usize; 2], side: Option<(usize, f64)>) {
+        let r = self.reference;
+        let ((u, bu), (v, bv)) = (&self.u[i][place[0]], &self.v[place[1]]);
+        let uv = DVec2::new(*u, *v);
+        let point = self.surface.jet_from(bu, bv, 0).p();
+        let kept = side.and_then(|(s, f)| {
+            let spans = if s % 2 == 0 { r.samples.m() } else { r.samples.n() };
+            Some(r.kept[s]?.distance_near(point, f, 1.0 / spans as f64))
+        });
+        let original = self.guess(i, place).and_then(|guess| {
+            let foot = match guess {
+                Guess::Near(surface, uv) => r.set.closest_near(point, (surface, uv), &mut self.scratch),
+                Guess::Anywhere => r.set.closest(point, f64::INFINITY, &mut self.scratch),
+            };
+            let distance = foot?.distance;
+            let hangs = distance > r.tol && over_gap(self.surface, r, uv, point, &mut self.scratch);
+            (!hangs).then_some(distance)
+        });
+        let distance = match (kept, original) {
+            (Some(a), Some(b)) => Some(a.max(b)),
+            (a, b) => a.or(b),
+        };
+        self.out.push(Check { kind, uv, point, distance });
+    }
+
+    /// Where on the originals a check point is about, from the samples at the corners of its piece (or the ends of
+    /// its span); `None` when one of them is not on an original, so that the point is not measured to them.
+    fn guess(&self, i: usize, place: [usize; 2]) -> Option<Guess> {
+        let samples = self.reference.samples;
+        let [s, t] = place.map(|k| places()[k]);
+        let corner = |a: usize, b: usize| {
+            let sample = &samples[(i + a, self.j + b)];
+            if sample.status.is_projected() { sample.on } else { None }
+        };
+        let first = corner(0, 0)?;
+        let (mut uv, mut one) = (DVec2::ZERO, true);
+        for b in 0..=usize::from(t > 0.0) {
+            for a in 0..=usize::from(s > 0.0) {
+                let (surface, at) = corner(a, b)?;
+                one &= surface == first.0;
+                uv += at * (if a == 1 { s } else { 1.0 - s }) * (if b == 1 { t } else { 1.0 - t });
+            }
+        }
+        Some(if one { Guess::Near(first.0, uv) } else { Guess::Anywhere })
     }
 }
 
-fn check(
-    surface: &Surface,
-    r: &Reference,
-    kind: Kind,
-    uv: DVec2,
-    corners: bool,
-    side: Option<(usize, f64)>,
-    scratch: &mut Scratch,
-) -> Check {
-    let point = surface.eval(uv);
-    let kept = side.and_then(|(s, f)| {
-        let spans = if s % 2 == 0 { r.samples.m() } else { r.samples.n() };
-        Some(r.kept[s]?.distance_near(point, f, 1.0 / spans as f64))
-    });
-    let mut original = None;
-    if corners {
-        original = r.set.closest(point, f64::INFINITY, scratch).map(|foot| foot.distance);
-        if original.is_some_and(|d| d > r.tol) && over_gap(surface, r, uv, point, scratch) {
-            original = None;
-        }
-    }
-    let distance = match (kept, original) {
-        (Some(a), Some(b)) => Some(a.max(b)),
-        (a, b) => a.or(b),
-    };
-    Check { kind, uv, point, distance }
+/// Where a closest point is looked for.
+enum Guess {
+    /// Near parameters of a surface.
+    Near(usize, DVec2),
+    /// Anywhere: the samples around lie on several.
+    Anywhere,
 }
 
 /// Whether nothing lies above or below a point of the patch within the slab.

@@ -7,7 +7,7 @@
 //! they extrapolate from either side does not meet in the middle.
 //!
 //! The matrix is positive definite with condition 1e4 to 1e9. Cost: O(K^3) a sample plus the search for
-//! neighbours, which is quadratic in the width of the gap. t is clamped to 0..=1: no sample leaves the slab.
+//! neighbours, whose rings are looked at until every octant has one or leaves the grid. t is clamped to 0..=1: no sample leaves the slab.
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -61,52 +61,67 @@ pub fn fill(known: &Grid<Option<f64>>, options: &HardyOptions, job: &Job) -> Gri
 fn neighbours(known: &Grid<Option<f64>>, i: usize, j: usize, count: usize) -> Vec<(usize, usize)> {
     let (m, n) = (known.m() as isize, known.n() as isize);
     let (ci, cj) = (i as isize, j as isize);
-    let mut found: Vec<(isize, usize, (usize, usize))> = Vec::new();
-    let mut octants = [false; 8];
-    let mut enough = None;
+    // By distance, then row by row.
+    type Key = (isize, usize, usize);
+    let mut of_octant: [Option<Key>; 8] = [None; 8];
+    let mut nearest: Vec<Key> = Vec::with_capacity(count + 1);
+    let reaches: [isize; 8] = std::array::from_fn(|o| reach(o, [ci, cj], [m, n]));
     for ring in 1..=m.max(n) {
-        // A ring further out by sqrt(2) may hold nothing nearer than the corners of this one.
-        if enough.is_some_and(|e: isize| 2 * ring * ring > 4 * e * e + 2) {
-            break;
-        }
-        for (a, b) in ring_cells(ci, cj, ring) {
-            if (0..=m).contains(&a) && (0..=n).contains(&b) && known[(a as usize, b as usize)].is_some() {
-                let (x, y) = (a - ci, b - cj);
-                let octant = octant(x, y);
-                octants[octant] = true;
-                found.push((x * x + y * y, octant, (a as usize, b as usize)));
+        let mut done = true;
+        for (o, best) in of_octant.iter_mut().enumerate() {
+            // Whether a sample this far out may still be the nearest of the octant, or among the nearest of all.
+            let wanted = |key: Option<&Key>| key.is_none_or(|k| ring * ring <= k.0);
+            let last = nearest.last().filter(|_| nearest.len() == count);
+            if ring > reaches[o] || !(wanted(best.as_ref()) || wanted(last)) {
+                continue;
+            }
+            done = false;
+            for (x, y) in arc(o, ring) {
+                let (a, b) = (ci + x, cj + y);
+                if (0..=m).contains(&a) && (0..=n).contains(&b) && known[(a as usize, b as usize)].is_some() {
+                    let key = (x * x + y * y, b as usize, a as usize);
+                    if best.is_none_or(|best| key < best) {
+                        *best = Some(key);
+                    }
+                    if nearest.len() < count || nearest.last().is_some_and(|last| key < *last) {
+                        nearest.insert(nearest.partition_point(|k| *k < key), key);
+                        nearest.truncate(count);
+                    }
+                }
             }
         }
-        if enough.is_none() && found.len() >= count && octants.iter().all(|&o| o) {
-            enough = Some(ring);
+        if done {
+            break;
         }
     }
-    found.sort_by_key(|f| (f.0, f.2.1, f.2.0));
-    let mut taken = [false; 8];
-    let mut out = Vec::new();
-    for f in &found {
-        if out.len() < count && !taken[f.1] {
-            taken[f.1] = true;
-            out.push(f.2);
+    let mut out: Vec<Key> = of_octant.into_iter().flatten().collect();
+    out.sort_unstable();
+    out.truncate(count);
+    for key in nearest {
+        if out.len() < count && !out.contains(&key) {
+            out.push(key);
         }
     }
-    for f in &found {
-        if out.len() < count && !out.contains(&f.2) {
-            out.push(f.2);
-        }
-    }
-    out
+    out.into_iter().map(|(_, b, a)| (a, b)).collect()
 }
 
-fn ring_cells(i: isize, j: isize, r: isize) -> impl Iterator<Item = (isize, isize)> {
-    let rows = (-r..=r).flat_map(move |k| [(i + k, j - r), (i + k, j + r)]);
-    let columns = (1 - r..r).flat_map(move |k| [(i - r, j + k), (i + r, j + k)]);
-    rows.chain(columns)
+/// How many steps from a sample to the border of the grid in the direction that an octant lies along.
+fn reach(octant: usize, at: [isize; 2], size: [isize; 2]) -> isize {
+    let along_x = octant & 1 == 1;
+    let negative = if along_x { octant & 4 != 0 } else { octant & 2 != 0 };
+    let k = usize::from(!along_x);
+    if negative { at[k] } else { size[k] - at[k] }
 }
 
-fn octant(x: isize, y: isize) -> usize {
-    let (sx, sy) = (usize::from(x < 0 || (x == 0 && y < 0)), usize::from(y < 0 || (y == 0 && x > 0)));
-    (sx * 2 + sy) * 2 + usize::from(x.abs() > y.abs())
+/// The steps of a ring that belong to an octant. Octants are numbered by the signs of x and y and by whether x is the
+/// longer one; a step along an axis belongs to the octant behind it, counter-clockwise.
+fn arc(octant: usize, ring: isize) -> impl Iterator<Item = (isize, isize)> {
+    let sign = |bit: usize| if octant & bit != 0 { -1 } else { 1 };
+    let (x, y, along_x) = (sign(4), sign(2), octant & 1 == 1);
+    // From the axis outwards; the axis itself when the other coordinate turns the right way.
+    let start = isize::from(if along_x { x == y } else { x != y });
+    let end = if along_x { ring - 1 } else { ring };
+    (start..=end).map(move |k| if along_x { (x * ring, y * k) } else { (x * k, y * ring) })
 }
 
 /// The interpolant of (12), plane removed, at a place. `None` without data.
@@ -114,7 +129,13 @@ fn value(data: &[(DVec2, f64)], at: DVec2, r: f64, gamma: f64) -> Option<f64> {
     let (center, mean, slope) = plane(data)?;
     let flat = |p: DVec2| mean + slope.dot(p - center);
     let phi = |a: DVec2, b: DVec2| (r + a.distance_squared(b)).powf(-gamma);
-    let matrix: Vec<Vec<f64>> = data.iter().map(|p| data.iter().map(|q| phi(p.0, q.0)).collect()).collect();
+    let mut matrix = vec![vec![0.0; data.len()]; data.len()];
+    for p in 0..data.len() {
+        for q in 0..=p {
+            matrix[p][q] = phi(data[p].0, data[q].0);
+            matrix[q][p] = matrix[p][q];
+        }
+    }
     let rest: Vec<f64> = data.iter().map(|&(p, t)| t - flat(p)).collect();
     // A singular matrix needs coincident samples, which an index grid has not; the plane is then what is left.
     let bumps = solve(matrix, rest).map_or(0.0, |c| c.iter().zip(data).map(|(c, (p, _))| c * phi(at, *p)).sum());
@@ -235,12 +256,64 @@ mod tests {
         }
     }
 
+    /// The octant of a step by its signs, with half-open borders.
+    fn octant(x: isize, y: isize) -> usize {
+        let (sx, sy) = (usize::from(x < 0 || (x == 0 && y < 0)), usize::from(y < 0 || (y == 0 && x > 0)));
+        (sx * 2 + sy) * 2 + usize::from(x.abs() > y.abs())
+    }
+
     #[test]
-    fn octants_are_eight() {
-        let mut seen = [0; 8];
-        for (x, y) in ring_cells(0, 0, 3) {
-            seen[octant(x, y)] += 1;
+    fn the_arcs_of_eight_octants_are_a_ring() {
+        for ring in 1..6 {
+            let mut steps: Vec<(isize, isize)> = Vec::new();
+            for o in 0..8 {
+                for (x, y) in arc(o, ring) {
+                    assert_eq!((octant(x, y), x.abs().max(y.abs())), (o, ring), "{x} {y}");
+                    steps.push((x, y));
+                }
+            }
+            steps.sort_unstable();
+            steps.dedup();
+            assert_eq!(steps.len() as isize, 8 * ring);
         }
-        assert!(seen.iter().all(|&s| s > 0) && seen.iter().sum::<i32>() == 24, "{seen:?}");
+    }
+
+    #[test]
+    fn the_neighbours_are_those_of_a_search_through_the_whole_grid() {
+        let holes: [fn(usize, usize) -> bool; 3] = [
+            |i, j| (4..=11).contains(&i) && (2..=6).contains(&j),
+            |i, j| i > 2 || j > 7,
+            |i, j| (i * 7 + j * 5) % 11 != 0,
+        ];
+        for hole in holes {
+            let known = Grid::from_fn(14, 9, |i, j| (!hole(i, j)).then_some(0.5));
+            for (i, j) in (0..=14).flat_map(|i| (0..=9).map(move |j| (i, j))).filter(|&(i, j)| hole(i, j)) {
+                let mut all: Vec<(isize, usize, usize, usize)> = Vec::new();
+                for b in 0..=9 {
+                    for a in 0..=14 {
+                        let (x, y) = (a as isize - i as isize, b as isize - j as isize);
+                        if known[(a, b)].is_some() {
+                            all.push((x * x + y * y, b, a, octant(x, y)));
+                        }
+                    }
+                }
+                all.sort_unstable();
+                for count in [3, 8, 12] {
+                    let mut expected: Vec<(usize, usize)> = Vec::new();
+                    let mut taken = [false; 8];
+                    for k in &all {
+                        if expected.len() < count && !std::mem::replace(&mut taken[k.3], true) {
+                            expected.push((k.2, k.1));
+                        }
+                    }
+                    for k in &all {
+                        if expected.len() < count && !expected.contains(&(k.2, k.1)) {
+                            expected.push((k.2, k.1));
+                        }
+                    }
+                    assert_eq!(neighbours(&known, i, j, count), expected, "{i} {j} {count}");
+                }
+            }
+        }
     }
 }

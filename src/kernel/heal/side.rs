@@ -37,6 +37,13 @@ pub enum SideError {
     },
 }
 
+/// Ends moved by less than this fraction of a piece's length have only been rounded.
+const UNMOVED: f64 = 1e-14;
+/// Places that are tried before Newton looks for the nearest point of a part of a piece.
+const PLACES: usize = 8;
+/// The most steps that it takes; halving alone then leaves 1e-12 of the part.
+const MAX_STEPS: usize = 40;
+
 #[derive(Clone, Debug)]
 struct Piece {
     curve: Curve,
@@ -62,6 +69,51 @@ impl Piece {
     fn at(&self, length: f64) -> DVec3 {
         let f = length / self.arc.length();
         self.curve.eval(self.parameter(length)) + self.shift[0].lerp(self.shift[1], f)
+    }
+
+    /// The distance of `p` from the part between two lengths, which is short enough to have one nearest point.
+    fn distance(&self, p: DVec3, within: [f64; 2]) -> f64 {
+        let [a, b] = within.map(|s| self.parameter(s));
+        let (mut low, mut high) = (a.min(b), a.max(b));
+        let moved = self.shift.iter().any(|s| s.length() > UNMOVED * self.arc.length());
+        let way = if self.reversed { -1.0 } else { 1.0 };
+        let drift = (self.shift[1] - self.shift[0]) / self.arc.length() * way;
+        // From p to the curve at t, and its derivatives by t. What the drift adds to the second is left out.
+        let at = |t: f64| {
+            let [c, d, dd, _] = self.curve.derivatives(t, 2);
+            if !moved {
+                return [c - p, d, dd];
+            }
+            let s = self.arc.length_at(&self.curve, t);
+            let s = if self.reversed { self.arc.length() - s } else { s };
+            [c + self.shift[0].lerp(self.shift[1], s / self.arc.length()) - p, d + drift * d.length(), dd]
+        };
+        // The best of a few places has the nearest point between its neighbours; Newton finds it there.
+        let place = |k: usize| low + (high - low) * k as f64 / PLACES as f64;
+        let squared = |k: usize| at(place(k))[0].length_squared();
+        let best = (0..=PLACES).map(|k| (squared(k), k)).min_by(|x, y| x.0.total_cmp(&y.0));
+        let Some((mut least, k)) = best else { return f64::INFINITY };
+        let mut t = place(k);
+        (low, high) = (place(k.saturating_sub(1)), place((k + 1).min(PLACES)));
+        for _ in 0..MAX_STEPS {
+            let [r, d, dd] = at(t);
+            least = least.min(r.length_squared());
+            let slope = r.dot(d);
+            if slope > 0.0 {
+                high = t;
+            } else {
+                low = t;
+            }
+            // A step of h moves the squared distance by less than (h d)^2.
+            let bend = d.length_squared() + r.dot(dd);
+            let next = if bend > 0.0 { t - slope / bend } else { f64::NAN };
+            let next = if next > low && next < high { next } else { 0.5 * (low + high) };
+            if (next - t).powi(2) * d.length_squared() <= 1e-14 * least || next == t {
+                break;
+            }
+            t = next;
+        }
+        least.sqrt()
     }
 
     fn turn(&mut self) {
@@ -184,24 +236,13 @@ impl SideCurve {
 
     /// The distance of `p` from the side near a fraction of its length (within `reach` of it, a fraction too).
     pub fn distance_near(&self, p: DVec3, fraction: f64, reach: f64) -> f64 {
-        // A bracket around the best of a few samples, narrowed by thirds: the squared distance has one valley there.
-        let count = 8;
-        let (low, high) = ((fraction - reach).max(0.0), (fraction + reach).min(1.0));
-        let at = |k: f64| self.point(low + (high - low) * k / f64::from(count)).distance_squared(p);
-        let best = (0..=count).map(|k| (at(f64::from(k)), k)).min_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((mut value, k)) = best else { return f64::INFINITY };
-        let (mut a, mut b) = (f64::from(k - 1).max(0.0), f64::from(k + 1).min(f64::from(count)));
-        for _ in 0..40 {
-            let (x, y) = (a + (b - a) / 3.0, b - (b - a) / 3.0);
-            let (fx, fy) = (at(x), at(y));
-            value = value.min(fx).min(fy);
-            if fx < fy {
-                b = y;
-            } else {
-                a = x;
-            }
-        }
-        value.sqrt()
+        let range = [fraction - reach, fraction + reach].map(|f| f.clamp(0.0, 1.0) * self.length);
+        self.pieces
+            .iter()
+            .map(|piece| (piece, range.map(|s| (s - piece.before).clamp(0.0, piece.arc.length()))))
+            .filter(|(_, [low, high])| low < high)
+            .map(|(piece, within)| piece.distance(p, within))
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// A box around the control points of all pieces.
@@ -343,5 +384,33 @@ mod tests {
         assert_eq!([moved.point(0.0), moved.point(1.0)], ends);
         let p = moved.point(0.3) + DVec3::Z * 0.5;
         assert!((moved.distance_near(p, 0.32, 0.1) - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_distance_near_a_fraction_is_that_of_a_dense_search() {
+        let arch = |x: f64, h: f64| {
+            let p = |dx: f64, y: f64| DVec3::new(x + dx, y, 0.2 * dx * y);
+            Curve::new(
+                crate::kernel::geom::Knots::bezier(3, 0.0, 1.0).unwrap(),
+                vec![p(0.0, 0.0), p(0.1, h), p(0.8, h), p(1.0, 0.0)],
+                Some(vec![1.0, 2.0, 0.7, 1.0]),
+            )
+            .unwrap()
+        };
+        let side = SideCurve::chain(&[arch(0.0, 0.8), arch(1.0, -0.5).reversed(), arch(2.0, 0.3)], 1e-6).unwrap();
+        let side = side.with_ends([side.ends()[0] + DVec3::Y * 0.05, side.ends()[1] - DVec3::Z * 0.03]);
+        for side in [side.reversed(), side] {
+            for k in 0..60 {
+                let (f, reach) = (f64::from(k) / 59.0, 0.02 + 0.001 * f64::from(k));
+                let p = side.point(f) + DVec3::new(0.02, -0.01, 0.04) * f64::from(k % 5);
+                let steps = 4000;
+                let dense = (0..=steps)
+                    .map(|i| (f + reach * (2.0 * f64::from(i) / f64::from(steps) - 1.0)).clamp(0.0, 1.0))
+                    .map(|f| side.point(f).distance(p))
+                    .fold(f64::INFINITY, f64::min);
+                let found = side.distance_near(p, f, reach);
+                assert!(found <= dense + 1e-14 && found > dense - 2e-4 * reach, "{k}: {found} {dense}");
+            }
+        }
     }
 }

@@ -27,6 +27,8 @@ use crate::kernel::job::Job;
 /// What two hits may be apart and still be one, and what a segment may pass by a border and still hit it, as a
 /// fraction of the diagonal.
 const SAME: f64 = 1e-9;
+/// How far a foot from a guess may be, in chord tolerances, for the search to start from it.
+const GOOD: f64 = 4.0;
 /// The most candidates of one query that are polished on the real surfaces.
 const CANDIDATES: usize = 64;
 
@@ -201,20 +203,51 @@ impl SurfaceSet {
     /// The closest point of all surfaces within `limit` of `p`.
     pub fn closest(&self, p: DVec3, limit: f64, scratch: &mut Scratch) -> Option<OnSurface> {
         let nearest = self.tree.nearest(p, limit + self.chord_tol)?;
-        let foot = |n: &Nearest| {
-            let (index, uv) = self.place(n.triangle, n.barycentric);
-            let surface = self.numbers[index];
-            let found = match &self.truths[index] {
-                Truth::Surface(s, closed) => {
-                    let foot = closest_from(s, *closed, p, uv);
-                    OnSurface { surface, uv: foot.uv, point: foot.point, distance: foot.distance }
-                }
-                Truth::Triangles => OnSurface { surface, uv, point: n.point, distance: n.distance },
-            };
-            (index, found)
+        let start = self.foot(p, &nearest);
+        let best = self.better(p, start, start.1.distance.min(nearest.distance), scratch);
+        (best.distance <= limit).then_some(best)
+    }
+
+    /// The closest point of all surfaces, given where about it is: the number of a surface and parameters there. The
+    /// answer is the same as without; a good guess saves most of the search.
+    pub fn closest_near(&self, p: DVec3, guess: (usize, DVec2), scratch: &mut Scratch) -> Option<OnSurface> {
+        let index = self.numbers.iter().position(|&n| n == guess.0);
+        if let Some(index) = index
+            && let Truth::Surface(surface, closed) = &self.truths[index]
+        {
+            let foot = closest_from(surface, *closed, p, guess.1);
+            if foot.distance <= GOOD * self.chord_tol {
+                let start = OnSurface { surface: guess.0, uv: foot.uv, point: foot.point, distance: foot.distance };
+                return Some(self.better(p, (index, start), start.distance, scratch));
+            }
+        }
+        self.closest(p, f64::INFINITY, scratch)
+    }
+
+    /// The foot that a triangle's nearest point leads to, with the index of its surface.
+    fn foot(&self, p: DVec3, n: &Nearest) -> (usize, OnSurface) {
+        let (index, uv) = self.place(n.triangle, n.barycentric);
+        let surface = self.numbers[index];
+        let found = match &self.truths[index] {
+            Truth::Surface(s, closed) => {
+                let foot = closest_from(s, *closed, p, uv);
+                OnSurface { surface, uv: foot.uv, point: foot.point, distance: foot.distance }
+            }
+            Truth::Triangles => OnSurface { surface, uv, point: n.point, distance: n.distance },
         };
-        let (mut at, mut best) = foot(&nearest);
-        self.tree.within(p, best.distance.min(nearest.distance) + self.chord_tol, &mut scratch.near);
+        (index, found)
+    }
+
+    /// The closest point, given a foot, with its surface's index, and a distance that none nearer to `p` exceeds: a
+    /// surface point within it has a triangle within it and the chord tolerance.
+    fn better(
+        &self,
+        p: DVec3,
+        (mut at, mut best): (usize, OnSurface),
+        within: f64,
+        scratch: &mut Scratch,
+    ) -> OnSurface {
+        self.tree.within(p, within + self.chord_tol, &mut scratch.near);
         let mut tried = 0;
         for candidate in &scratch.near {
             if candidate.distance - self.chord_tol >= best.distance || tried >= CANDIDATES {
@@ -229,12 +262,12 @@ impl SurfaceSet {
                 continue;
             }
             tried += 1;
-            let (index, other) = foot(candidate);
+            let (index, other) = self.foot(p, candidate);
             if other.distance < best.distance {
                 (at, best) = (index, other);
             }
         }
-        (best.distance <= limit).then_some(best)
+        best
     }
 
     /// All points where the segment from `a` to `b` meets the surfaces, by increasing t. Points that coincide

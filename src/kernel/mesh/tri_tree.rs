@@ -17,6 +17,8 @@ use crate::kernel::geom::Aabb;
 
 const LEAF: usize = 4;
 const BINS: usize = 16;
+/// Up to this many triangles are split along the longest axis of their centres.
+const FEW: usize = 64;
 /// Below this depth nodes are halved by count, so that no input makes the tree deeper than the stack.
 const SAH_DEPTH: usize = 40;
 const STACK: usize = 96;
@@ -125,7 +127,8 @@ impl TriTree {
                 Item { min: a.min(b).min(c) - pad, max: a.max(b).max(c) + pad, id: id as u32 }
             })
             .collect();
-        let nodes = build(&mut items, 0, 0);
+        let mut nodes = Vec::new();
+        build(&mut items, 0, 0, &mut nodes);
         let ids: Vec<u32> = items.iter().map(|i| i.id).collect();
         let triangles = ids.iter().map(|&id| triangles[id as usize]).collect();
         Self { points, triangles, ids, nodes, bounds: Some(bounds), origin }
@@ -294,14 +297,18 @@ impl TriTree {
     pub fn within(&self, p: DVec3, reach: f64, found: &mut Vec<Nearest>) {
         found.clear();
         let local = p - self.origin;
-        let mut stack = vec![0_u32];
-        while let Some(at) = stack.pop() {
+        let mut stack = [0_u32; STACK];
+        let mut depth = 1;
+        while depth > 0 {
+            depth -= 1;
+            let at = stack[depth];
             let Some(node) = self.nodes.get(at as usize) else { return };
             if node.distance_squared(local) > reach * reach {
                 continue;
             }
             if node.count == 0 {
-                stack.extend([at + 1, at + node.link]);
+                (stack[depth], stack[depth + 1]) = (at + 1, at + node.link);
+                depth += 2;
                 continue;
             }
             for k in node.link as usize..(node.link + node.count) as usize {
@@ -361,68 +368,60 @@ impl Node {
     }
 }
 
-fn build(items: &mut [Item], first: usize, depth: usize) -> Vec<Node> {
+/// Appends the nodes of a subtree whose first triangle has the number `first`.
+fn build(items: &mut [Item], first: usize, depth: usize, nodes: &mut Vec<Node>) {
     let mut all = Box32::EMPTY;
     items.iter().for_each(|i| all.add(i.min, i.max));
     let node = |link: u32, count: u32| Node { min: all.min.to_array(), link, max: all.max.to_array(), count };
     let count = items.len();
-    let leaf = || vec![node(first as u32, count as u32)];
-    if count <= 1 {
-        return leaf();
-    }
-    let middle = match if depth < SAH_DEPTH { split(items, &all) } else { None } {
-        Some(middle) => middle,
-        None if count <= LEAF => return leaf(),
-        None => halve(items),
+    let middle = if count <= 1 {
+        None
+    } else {
+        let best = if depth < SAH_DEPTH { split(items, &all) } else { None };
+        best.or_else(|| (count > LEAF).then(|| halve(items)))
+    };
+    let Some(middle) = middle else {
+        nodes.push(node(first as u32, count as u32));
+        return;
     };
     let (left, right) = items.split_at_mut(middle);
-    let (mut l, mut r) = if left.len() + right.len() > PARALLEL {
-        rayon::join(|| build(left, first, depth + 1), || build(right, first + middle, depth + 1))
+    let at = nodes.len();
+    nodes.push(node(0, 0));
+    if left.len() + right.len() > PARALLEL {
+        let mut behind = Vec::new();
+        rayon::join(|| build(left, first, depth + 1, nodes), || build(right, first + middle, depth + 1, &mut behind));
+        nodes[at].link = (nodes.len() - at) as u32;
+        nodes.append(&mut behind);
     } else {
-        (build(left, first, depth + 1), build(right, first + middle, depth + 1))
-    };
-    let mut nodes = Vec::with_capacity(1 + l.len() + r.len());
-    nodes.push(node(1 + l.len() as u32, 0));
-    nodes.append(&mut l);
-    nodes.append(&mut r);
-    nodes
+        build(left, first, depth + 1, nodes);
+        nodes[at].link = (nodes.len() - at) as u32;
+        build(right, first + middle, depth + 1, nodes);
+    }
 }
 
 /// Reorders the items by the cheapest of the binned planes; `None` when a leaf is cheaper or no plane parts them.
+/// Few items are binned along the longest axis only, into fewer bins: they are what most of the time goes to.
 fn split(items: &mut [Item], all: &Box32) -> Option<usize> {
     let mut centers = Box32::EMPTY;
     items.iter().for_each(|i| centers.add(i.center(), i.center()));
     let extent = centers.max - centers.min;
+    let few = items.len() <= FEW;
+    let longest = (0..3).max_by(|&a, &b| extent[a].total_cmp(&extent[b])).unwrap_or(0);
     let mut best: Option<(f32, usize, usize)> = None;
     for axis in 0..3 {
-        let scale = BINS as f32 / extent[axis];
-        if !(extent[axis] > 0.0 && scale.is_finite()) {
+        if few && axis != longest {
             continue;
         }
-        let mut bins = [(Box32::EMPTY, 0_usize); BINS];
-        for i in items.iter() {
-            let bin = &mut bins[bin_of(i, axis, centers.min[axis], scale)];
-            bin.0.add(i.min, i.max);
-            bin.1 += 1;
-        }
-        let mut behind = [(0.0_f32, 0_usize); BINS];
-        let (mut grow, mut count) = (Box32::EMPTY, 0);
-        for b in (1..BINS).rev() {
-            grow.add(bins[b].0.min, bins[b].0.max);
-            count += bins[b].1;
-            behind[b] = (grow.area(), count);
-        }
-        let (mut grow, mut count) = (Box32::EMPTY, 0);
-        for b in 1..BINS {
-            grow.add(bins[b - 1].0.min, bins[b - 1].0.max);
-            count += bins[b - 1].1;
-            if count == 0 || behind[b].1 == 0 {
-                continue;
-            }
-            let cost = grow.area() * count as f32 + behind[b].0 * behind[b].1 as f32;
-            if best.is_none_or(|(c, ..)| cost < c) {
-                best = Some((cost, axis, b));
-            }
+        let (low, extent) = (centers.min[axis], extent[axis]);
+        let found = if few {
+            cheapest::<{ BINS / 2 }>(items, axis, low, extent)
+        } else {
+            cheapest::<BINS>(items, axis, low, extent)
+        };
+        if let Some((cost, bin)) = found
+            && best.is_none_or(|(c, ..)| cost < c)
+        {
+            best = Some((cost, axis, bin));
         }
     }
     let (cost, axis, bin) = best?;
@@ -430,10 +429,11 @@ fn split(items: &mut [Item], all: &Box32) -> Option<usize> {
     if items.len() <= LEAF && all.area() * (items.len() as f32 - 1.0) <= cost {
         return None;
     }
-    let scale = BINS as f32 / extent[axis];
+    let bins = if few { BINS / 2 } else { BINS };
+    let scale = bins as f32 / extent[axis];
     let mut middle = 0;
     for k in 0..items.len() {
-        if bin_of(&items[k], axis, centers.min[axis], scale) < bin {
+        if bin_of(&items[k], axis, centers.min[axis], scale, bins) < bin {
             items.swap(k, middle);
             middle += 1;
         }
@@ -441,8 +441,43 @@ fn split(items: &mut [Item], all: &Box32) -> Option<usize> {
     Some(middle)
 }
 
-fn bin_of(item: &Item, axis: usize, low: f32, scale: f32) -> usize {
-    (((item.center()[axis] - low) * scale) as usize).min(BINS - 1)
+/// The cheapest of the planes between the bins along an axis, with its cost; `None` when none parts the items.
+fn cheapest<const N: usize>(items: &[Item], axis: usize, low: f32, extent: f32) -> Option<(f32, usize)> {
+    let scale = N as f32 / extent;
+    if !(extent > 0.0 && scale.is_finite()) {
+        return None;
+    }
+    let mut bins = [(Box32::EMPTY, 0_usize); N];
+    for i in items {
+        let bin = &mut bins[bin_of(i, axis, low, scale, N)];
+        bin.0.add(i.min, i.max);
+        bin.1 += 1;
+    }
+    let mut behind = [(0.0_f32, 0_usize); N];
+    let (mut grow, mut count) = (Box32::EMPTY, 0);
+    for b in (1..N).rev() {
+        grow.add(bins[b].0.min, bins[b].0.max);
+        count += bins[b].1;
+        behind[b] = (grow.area(), count);
+    }
+    let mut best: Option<(f32, usize)> = None;
+    let (mut grow, mut count) = (Box32::EMPTY, 0);
+    for b in 1..N {
+        grow.add(bins[b - 1].0.min, bins[b - 1].0.max);
+        count += bins[b - 1].1;
+        if count == 0 || behind[b].1 == 0 {
+            continue;
+        }
+        let cost = grow.area() * count as f32 + behind[b].0 * behind[b].1 as f32;
+        if best.is_none_or(|(c, _)| cost < c) {
+            best = Some((cost, b));
+        }
+    }
+    best
+}
+
+fn bin_of(item: &Item, axis: usize, low: f32, scale: f32, bins: usize) -> usize {
+    (((item.center()[axis] - low) * scale) as usize).min(bins - 1)
 }
 
 /// Halves by count along the longest axis of the centres.
