@@ -121,21 +121,41 @@ impl Recipe {
     }
 }
 
+/// Room for numbers, on the stack as long as they are few: a lazy query builds thousands of small subtrees.
+struct Room<T, const N: usize> {
+    small: [T; N],
+    large: Vec<T>,
+}
+
+impl<T: Copy, const N: usize> Room<T, N> {
+    #[inline(always)]
+    fn new(count: usize, fill: T) -> Self {
+        Self { small: [fill; N], large: if count > N { vec![fill; count] } else { Vec::new() } }
+    }
+
+    #[inline(always)]
+    fn slice(&mut self, count: usize) -> &mut [T] {
+        if count > N { &mut self.large[..count] } else { &mut self.small[..count] }
+    }
+}
+
+/// The numbers of a rational bicubic net.
+const NET: usize = 64;
+
 fn subnet<H: Shape>(shape: H, net: &[f64], index: u32) -> Vec<f64> {
     let size = shape.size();
-    let mut room = vec![0.0; 3 * size];
+    let mut room = Room::<f64, { 3 * NET }>::new(3 * size, 0.0);
+    let room = room.slice(3 * size);
     room[..size].copy_from_slice(net);
     let depth = index.ilog2() as usize;
     // The net and its two halves take turns in three places.
     let mut here = 0;
     for level in 0..depth {
         let [low, high] = [(here + 1) % 3, (here + 2) % 3];
-        split_within(shape, direction(level), &mut room, [here, low, high]);
+        split_within(shape, direction(level), room, [here, low, high]);
         here = if index >> (depth - 1 - level) & 1 == 1 { high } else { low };
     }
-    room.copy_within(here * size..(here + 1) * size, 0);
-    room.truncate(size);
-    room
+    room[here * size..(here + 1) * size].to_vec()
 }
 
 /// Splits the net in one place of a row of nets into two others.
@@ -174,16 +194,14 @@ impl<H: Shape> WithSimd for Subtree<'_, H> {
 }
 
 /// The nets of the levels from the root down to the first that fills the lanes, in heap order from 0.
-fn first_levels<H: Shape>(shape: H, net: &[f64], depth: usize, count: usize) -> Vec<f64> {
-    let size = shape.size();
-    let mut nets = vec![0.0; ((2 << count) - 1) * size];
-    nets[..size].copy_from_slice(net);
+#[inline(always)]
+fn first_levels<H: Shape>(shape: H, net: &[f64], depth: usize, count: usize, nets: &mut [f64]) {
+    nets[..shape.size()].copy_from_slice(net);
     for level in 0..count {
         for at in (1 << level) - 1..(2 << level) - 1 {
-            split_within(shape, direction(depth + level), &mut nets, [at, 2 * at + 1, 2 * at + 2]);
+            split_within(shape, direction(depth + level), nets, [at, 2 * at + 1, 2 * at + 2]);
         }
     }
-    nets
 }
 
 #[inline(always)]
@@ -192,14 +210,19 @@ fn lanes<S: Simd, H: Shape>(simd: S, recipe: &Recipe, shape: H, net: &[f64], dep
     let size = shape.size();
     let last = levels.len() - 1;
     let above = (S::F64_LANES.ilog2() as usize).min(last);
-    let first_nets = first_levels(shape, net, depth, above);
+    // Both children of every level of the path, then room for the fits.
+    let counts = [((2 << above) - 1) * size, (2 * (last - above) + 2) * size, 2 * size];
+    let mut first_room = Room::<f64, { 7 * NET }>::new(counts[0], 0.0);
+    let first_nets = first_room.slice(counts[0]);
+    first_levels(shape, net, depth, above, first_nets);
     let zero = F::splat(simd, 0.0);
     let slack = F::splat(simd, recipe.slack);
     let noise = F::splat(simd, recipe.noise);
     let matrices = [&recipe.matrices[0][..], &recipe.matrices[1][..]];
-    // Both children of every level of the path, then room for the fits.
-    let mut nets_of_path = vec![zero; (2 * (last - above) + 2) * size];
-    let mut scratch = vec![zero; 2 * size];
+    let mut path_room = Room::<F<S>, { 2 * NET }>::new(counts[1], zero);
+    let nets_of_path = path_room.slice(counts[1]);
+    let mut scratch_room = Room::<F<S>, { 2 * NET }>::new(counts[2], zero);
+    let scratch = scratch_room.slice(counts[2]);
     // The levels above fill only some of the lanes; from `above` on each lane is a subtree of its own.
     let (mut level, mut path) = (0, 0_usize);
     loop {
@@ -224,7 +247,7 @@ fn lanes<S: Simd, H: Shape>(simd: S, recipe: &Recipe, shape: H, net: &[f64], dep
             level += 1;
             continue;
         }
-        let fitted = fit(simd, shape, net, &mut scratch, slack);
+        let fitted = fit(simd, shape, net, scratch, slack);
         for lane in 0..used {
             row[(lane << down) | path] = Node::of_lane(&fitted, lane);
         }
@@ -240,7 +263,7 @@ fn lanes<S: Simd, H: Shape>(simd: S, recipe: &Recipe, shape: H, net: &[f64], dep
             continue;
         }
         if !tori.is_empty() {
-            let numbers = osculate(simd, shape, net, matrices, fitted.center, &mut scratch, noise);
+            let numbers = osculate(simd, shape, net, matrices, fitted.center, scratch, noise);
             let mut plain = [0.0; LEAF_NUMBERS];
             for lane in 0..used {
                 for k in 0..LEAF_NUMBERS {

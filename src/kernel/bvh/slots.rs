@@ -1,10 +1,12 @@
 //! Fixed places for what is built on demand: an array of write-once cells, in pages that are made when first touched.
 //!
-//! Any thread may fill a cell; the value depends on the place alone, so who comes first does not matter.
+//! Any thread may fill a cell; the value depends on the place alone, so who comes first does not matter. Pages are
+//! small: a query touches few cells of each, and clearing the others is what it pays for. Sixteen places in heap
+//! order lie below one node two quadtree levels up.
 
 use std::sync::OnceLock;
 
-const PAGE: usize = 256;
+const PAGE: usize = 16;
 
 type Cell<T> = OnceLock<Box<T>>;
 type Page<T> = OnceLock<Box<[Cell<T>]>>;
@@ -13,33 +15,43 @@ type Page<T> = OnceLock<Box<[Cell<T>]>>;
 #[derive(Debug)]
 pub(crate) struct Slots<T> {
     length: usize,
-    pages: Box<[Page<T>]>,
+    pages: OnceLock<Box<[Page<T>]>>,
 }
 
 impl<T> Slots<T> {
     /// With places 0..length.
     pub fn new(length: usize) -> Self {
-        Self { length, pages: (0..length.div_ceil(PAGE)).map(|_| OnceLock::new()).collect() }
+        Self { length, pages: OnceLock::new() }
     }
 
     /// The value at a place below the length, made now if it was not before.
     #[inline]
     pub fn get_or(&self, at: usize, make: impl FnOnce() -> T) -> &T {
-        let page = self.pages[at / PAGE]
-            .get_or_init(|| (0..PAGE.min(self.length - at / PAGE * PAGE)).map(|_| OnceLock::new()).collect());
+        let pages = self.pages.get_or_init(|| empty(self.length.div_ceil(PAGE)));
+        let page = pages[at / PAGE].get_or_init(|| empty(PAGE.min(self.length - at / PAGE * PAGE)));
         page[at % PAGE].get_or_init(|| Box::new(make()))
+    }
+
+    /// The pages that are there.
+    fn pages(&self) -> impl Iterator<Item = &[Cell<T>]> {
+        self.pages.get().into_iter().flatten().filter_map(OnceLock::get).map(|page| &**page)
     }
 
     /// How many places are filled.
     pub fn filled(&self) -> usize {
-        self.pages.iter().filter_map(OnceLock::get).flatten().filter(|cell| cell.get().is_some()).count()
+        self.pages().flatten().filter(|cell| cell.get().is_some()).count()
     }
 
     /// Bytes on the heap: the page table, the pages, the values.
     pub fn bytes(&self) -> usize {
-        let pages: usize = self.pages.iter().filter_map(OnceLock::get).map(|page| page.len()).sum();
-        self.pages.len() * size_of::<Page<T>>() + pages * size_of::<Cell<T>>() + self.filled() * size_of::<T>()
+        let cells: usize = self.pages().map(<[_]>::len).sum();
+        let table = self.pages.get().map_or(0, |pages| pages.len());
+        table * size_of::<Page<T>>() + cells * size_of::<Cell<T>>() + self.filled() * size_of::<T>()
     }
+}
+
+fn empty<T>(count: usize) -> Box<[OnceLock<T>]> {
+    (0..count).map(|_| OnceLock::new()).collect()
 }
 
 #[cfg(test)]
@@ -49,12 +61,12 @@ mod tests {
     #[test]
     fn a_place_is_filled_once_and_counted() {
         let slots = Slots::new(600);
-        assert_eq!(slots.filled(), 0);
+        assert_eq!((slots.filled(), slots.bytes()), (0, 0));
         assert_eq!(*slots.get_or(599, || 7), 7);
         assert_eq!(*slots.get_or(599, || 8), 7);
         assert_eq!(*slots.get_or(0, || 9), 9);
         assert_eq!(slots.filled(), 2);
         // A page is a fat pointer and its state, a place a thin one and its state.
-        assert_eq!(slots.bytes(), 3 * 24 + (256 + 88) * 16 + 2 * 4);
+        assert_eq!(slots.bytes(), 38 * 24 + (16 + 8) * 16 + 2 * 4);
     }
 }

@@ -34,13 +34,18 @@ pub(crate) fn net_area(patch: &BezierPatch) -> f64 {
 pub(crate) fn build(patches: &[PatchTree], grid: [usize; 2], origin: DVec3) -> Vec<TopNode> {
     let mut nodes = Vec::new();
     if patches.len() > 1 && patches.len() == grid[0] * grid[1] {
-        group(patches, grid[0], origin, [[0, grid[0]], [0, grid[1]]], &mut nodes);
+        let balls: Vec<_> = patches.iter().map(|patch| balls(patch, origin)).collect();
+        group(patches, &balls, grid[0], origin, [[0, grid[0]], [0, grid[1]]], &mut nodes);
     }
     nodes
 }
 
+/// Four balls, whose hull holds a patch.
+type Balls = [(DVec3, f64); 4];
+
 fn group(
     patches: &[PatchTree],
+    of_patches: &[Balls],
     width: usize,
     origin: DVec3,
     ranges: [[usize; 2]; 2],
@@ -60,13 +65,13 @@ fn group(
         let middle = j0.midpoint(j1);
         [[[i0, i1], [j0, middle]], [[i0, i1], [middle, j1]]]
     };
-    let children = halves.map(|half| group(patches, width, origin, half, nodes));
+    let children = halves.map(|half| group(patches, of_patches, width, origin, half, nodes));
     let cones = children.map(|id| match id.is_top() {
         true => nodes[id.index as usize].node.cone(),
         false => patches[id.patch as usize].node(1).cone(),
     });
-    let members = (j0..j1).flat_map(|j| (i0..i1).map(move |i| j * width + i)).map(|k| &patches[k]);
-    let balls: Vec<(DVec3, f64)> = members.flat_map(|patch| balls(patch, origin)).collect();
+    let mut balls = Vec::with_capacity(4 * (i1 - i0) * (j1 - j0));
+    (j0..j1).for_each(|j| balls.extend_from_slice(of_patches[j * width + i0..j * width + i1].as_flattened()));
     // Axes from the corners of the group, as for a patch.
     let corner = |i: usize, j: usize| center(&patches[j * width + i], origin);
     let (c00, c10) = (corner(i0, j0), corner(i1 - 1, j0));
@@ -89,7 +94,7 @@ fn center(patch: &PatchTree, origin: DVec3) -> DVec3 {
 }
 
 /// The swept sphere of a patch as the hull of four balls.
-fn balls(patch: &PatchTree, origin: DVec3) -> [(DVec3, f64); 4] {
+fn balls(patch: &PatchTree, origin: DVec3) -> Balls {
     let node = patch.node(1);
     node.rectangle().corners().map(|c| (c + (patch.origin() - origin), node.radius()))
 }

@@ -33,7 +33,12 @@ impl<S: Simd> F<S> {
     /// The first [`Simd::F64_LANES`] numbers of a slice; missing ones are 0.
     #[inline(always)]
     pub fn load(simd: S, values: &[f64]) -> Self {
-        Self { simd, v: simd.partial_load_f64s(&values[..values.len().min(S::F64_LANES)]) }
+        // A partial load goes through a table of jumps.
+        let v = match S::as_simd_f64s(values).0 {
+            [whole, ..] => *whole,
+            [] => simd.partial_load_f64s(values),
+        };
+        Self { simd, v }
     }
 
     /// The same number in every lane, with the lanes of `self`.
