@@ -1,6 +1,7 @@
 //! The hybrid bounding volume hierarchy: rectangle-swept spheres with osculating tori at the leaves.
 
 pub(crate) mod build;
+mod closest;
 pub(crate) mod fit;
 mod hull;
 pub(crate) mod net;
@@ -19,6 +20,7 @@ mod validate;
 mod volumes;
 
 pub use build::Instructions;
+pub use closest::GlobalFoot;
 pub use node::{Node, NormalCone};
 pub use patch_tree::{Memory, PatchTree};
 pub use rectangle::Rectangle;

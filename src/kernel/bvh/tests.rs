@@ -29,7 +29,7 @@ impl Random {
 
 /// What is special about a random surface.
 #[derive(Clone, Copy, Debug, Default)]
-struct Kind {
+pub(super) struct Kind {
     degree: [usize; 2],
     spans: [usize; 2],
     rational: bool,
@@ -39,7 +39,7 @@ struct Kind {
     away: f64,
 }
 
-fn random_surface(kind: Kind, random: &mut Random) -> Surface {
+pub(super) fn random_surface(kind: Kind, random: &mut Random) -> Surface {
     let knots = |k: usize| {
         let breaks: Vec<f64> = (0..=kind.spans[k]).map(|i| i as f64).collect();
         Knots::clamped(kind.degree[k], &breaks, 1).unwrap()
@@ -67,7 +67,7 @@ fn random_surface(kind: Kind, random: &mut Random) -> Surface {
     Surface::new(u, v, points, weights).unwrap()
 }
 
-fn kinds() -> Vec<Kind> {
+pub(super) fn kinds() -> Vec<Kind> {
     let base = Kind { degree: [3, 3], spans: [1, 1], ..Kind::default() };
     let mut kinds = vec![
         base,
@@ -87,7 +87,7 @@ fn kinds() -> Vec<Kind> {
     kinds
 }
 
-fn samples(surface: &Surface, count: usize, random: &mut Random) -> Vec<DVec2> {
+pub(super) fn samples(surface: &Surface, count: usize, random: &mut Random) -> Vec<DVec2> {
     let [u, v] = surface.domain();
     let at = |[low, high]: [f64; 2], t: f64| low + (high - low) * t;
     (0..count)
@@ -235,6 +235,31 @@ fn a_toroidal_cover_reaches_its_tolerance_or_says_where_not() {
     assert!(!tree.toroidal_cover(1e-3, &stopped).complete);
 }
 
+#[test]
+fn the_closest_point_is_the_nearest_of_all() {
+    let mut random = Random(18);
+    for kind in kinds() {
+        let surface = random_surface(kind, &mut random);
+        let tree = SurfaceTree::new(&surface, &BvhOptions { height: 5, ..BvhOptions::default() }).unwrap();
+        let bounds = surface.bounds();
+        let dense: Vec<DVec3> = samples(&surface, 1500, &mut random).iter().map(|&uv| surface.eval(uv)).collect();
+        for _ in 0..12 {
+            let p = bounds.center() + random.vector() * bounds.size();
+            let found = tree.closest(&surface, p, f64::INFINITY).unwrap();
+            let distance = found.foot.distance;
+            assert_eq!(surface.eval(found.foot.uv), found.foot.point);
+            let slow = dense.iter().map(|q| q.distance(p)).fold(f64::INFINITY, f64::min);
+            let rounding = 1e-14 * bounds.max_abs();
+            assert!(distance <= slow + rounding, "{kind:?}: {distance} {slow}");
+            assert!(found.lower <= distance && found.lower <= slow, "{kind:?}");
+            // The bound is as good as the leaves are small.
+            let size = 2.0 * tree.node(found.leaf).sphere_radius();
+            assert!(found.lower >= distance - size - rounding, "{kind:?}: {found:?} {size}");
+            assert!(tree.closest(&surface, p, 0.999 * found.lower - rounding).is_none());
+        }
+    }
+}
+
 /// Two wavy graphs that cross.
 fn crossing() -> [Surface; 2] {
     let mut random = Random(21);
@@ -359,6 +384,37 @@ fn flatness_cuts_where_the_surface_is_flat_enough() {
     assert!(tree.build_all(true, &Job::new()).unwrap());
     assert!(tree.memory().total() < 4096 * 2 * 64);
     validate(&surface, &tree, samples(&surface, 50, &mut Random(15))).unwrap();
+}
+
+#[test]
+fn knots_that_are_not_clamped_repeat_or_run_around_are_normal_input() {
+    let mut random = Random(19);
+    let open = Knots::new(3, (0..10).map(f64::from).collect()).unwrap();
+    let repeated = Knots::new(2, vec![-1.0, 0.0, 0.0, 1.0, 1.0, 2.0, 3.0, 3.0]).unwrap();
+    for periodic in [false, true] {
+        let (nu, nv) = (open.control_count(), repeated.control_count());
+        let mut points: Vec<DVec3> = (0..nu * nv)
+            .map(|at| {
+                let angle = (at % nu) as f64 * std::f64::consts::TAU / 3.0;
+                DVec3::new(angle.cos(), angle.sin(), (at / nu) as f64) + random.vector() * 0.1
+            })
+            .collect();
+        if periodic {
+            // Uniform knots and the first three columns again: closed with continuous curvature.
+            for at in 0..nu * nv {
+                if at % nu >= 3 {
+                    points[at] = points[at - 3];
+                }
+            }
+        }
+        let surface = Surface::new(open.clone(), repeated.clone(), points, None).unwrap();
+        let [u, v] = surface.domain();
+        let seam = surface.eval(DVec2::new(u[0], v[0])).distance(surface.eval(DVec2::new(u[1], v[0])));
+        assert_eq!(seam < 1e-14, periodic);
+        let tree = SurfaceTree::new(&surface, &BvhOptions { height: 4, ..BvhOptions::default() }).unwrap();
+        assert_eq!(tree.grid(), [3, 2]);
+        validate(&surface, &tree, samples(&surface, 80, &mut random)).unwrap_or_else(|broken| panic!("{broken}"));
+    }
 }
 
 #[test]

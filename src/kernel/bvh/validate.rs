@@ -137,6 +137,13 @@ fn torus(
         let at_foot = torus.normal_at(foot);
         let angle = at_foot.cross(normal).length().atan2(at_foot.dot(normal));
         check("normal", angle, torus.normal_deviation(), 1e-9)?;
+        // Latitude and longitude of the normal on the Gauss sphere of the torus, whose poles are along the spine.
+        let [meridian, rotation] = torus.half_angles_of_normals();
+        let latitude = normal.dot(torus.e[0]).clamp(-1.0, 1.0).asin().abs();
+        let longitude = normal.dot(torus.e[1]).atan2(normal.dot(torus.normal)).abs();
+        check("meridian extent of normals", latitude, meridian, 1e-9)?;
+        // Near a pole the longitude of a rounded normal means little.
+        check("rotation extent of normals", longitude, rotation, 1e-9 / latitude.cos().max(1e-9))?;
     }
     Ok(())
 }

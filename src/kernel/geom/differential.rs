@@ -228,6 +228,30 @@ mod tests {
     }
 
     #[test]
+    fn near_an_umbilic_curvatures_keep_their_digits_and_directions_their_frame() {
+        // z = (a x^2 + b y^2) / 2 turned by an angle, with b - a from 1 down to 0: at the origin k are a and b.
+        for split in [1.0, 1e-4, 1e-8, 1e-12, 1e-15, 0.0] {
+            for turn in [0.0_f64, 0.3, 1.1, 2.6] {
+                let (a, b) = (0.7, 0.7 + split);
+                let (sin, cos) = turn.sin_cos();
+                let mut jet = SurfaceJet::default();
+                (jet.d[1][0], jet.d[0][1]) = (DVec3::X, DVec3::Y);
+                jet.d[2][0] = DVec3::Z * (a * cos * cos + b * sin * sin);
+                jet.d[1][1] = DVec3::Z * ((b - a) * sin * cos);
+                jet.d[0][2] = DVec3::Z * (a * sin * sin + b * cos * cos);
+                let c = Curvature::of(&jet).unwrap();
+                // The root of H^2 - K would lose half of the digits: 1e-8.
+                assert!((c.k[0] - b).abs() < 1e-15 && (c.k[1] - a).abs() < 1e-15, "{split} {turn}: {:?}", c.k);
+                assert!(c.e[0].dot(c.e[1]).abs() < 1e-15 && c.e[0].cross(c.e[1]).distance(c.normal) < 1e-15);
+                if split >= 1e-8 {
+                    let along = DVec3::new(sin, cos, 0.0);
+                    assert!(c.e[0].cross(along).length() < 1e-14 / split, "{split} {turn}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn a_cusp_inside_the_domain_has_no_normal() {
         // (u^2, u^3, v): Su vanishes along u = 0, and the normal turns over there.
         let k = |degree| Knots::bezier(degree, -1.0, 1.0).unwrap();

@@ -9,9 +9,12 @@ pub mod arc_length;
 mod bezier;
 pub mod blossom;
 pub mod closest;
+pub mod closest_curve;
 mod curve;
 mod differential;
 mod knots;
+#[cfg(test)]
+mod precise;
 mod surface;
 pub mod sweep;
 
