@@ -8,11 +8,10 @@ use serde::Serialize;
 
 use super::{CliError, Common, Exit, ProgressLine};
 use crate::kernel::bvh::{
-    BvhOptions, MAX_HEIGHT, Overlap, Summary, SurfaceTree, TraverseOptions, Verdict, VolumeKind, VolumeTree,
+    BvhOptions, MAX_HEIGHT, Memory, Overlap, Summary, SurfaceTree, TraverseOptions, Verdict, VolumeKind, VolumeTree,
     early_exit, traverse,
 };
 use crate::kernel::geom::Surface;
-use crate::kernel::job::Job;
 use crate::model::document::Document;
 
 /// Arguments of `bvh`.
@@ -29,6 +28,9 @@ pub struct Args {
     /// Bounding volumes
     #[arg(long, value_enum, default_value_t = Volume::Rss)]
     pub volume: Volume,
+    /// Leave nodes whole that are flatter than this, in model units (rss only)
+    #[arg(long, value_name = "RADIUS", allow_negative_numbers = true)]
+    pub flatness: Option<f64>,
     /// Number of a second surface to traverse it with
     #[arg(long, value_name = "M")]
     pub with: Option<usize>,
@@ -71,10 +73,10 @@ struct Tree {
     patches: [usize; 2],
     build_ms: f64,
     bytes: usize,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    parts: Option<Parts>,
+    parts: Parts,
 }
 
+/// Storage by part; the levels of rectangle-swept spheres.
 #[derive(Debug, Serialize)]
 struct Parts {
     nodes: usize,
@@ -82,7 +84,21 @@ struct Parts {
     tori: usize,
     torus_bytes: usize,
     other_bytes: usize,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     levels: Vec<Summary>,
+}
+
+impl Parts {
+    fn new(memory: &Memory, levels: Vec<Summary>) -> Self {
+        Self {
+            nodes: memory.nodes,
+            node_bytes: memory.node_bytes,
+            tori: memory.tori,
+            torus_bytes: memory.torus_bytes,
+            other_bytes: memory.other_bytes,
+            levels,
+        }
+    }
 }
 
 #[derive(Debug, Serialize)]
@@ -113,8 +129,14 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
     let opened = crate::io::open(&args.file)?;
     let first = surface(&opened.document, args.surface)?;
     let second = args.with.map(|n| surface(&opened.document, n)).transpose()?;
-    let options = BvhOptions { height: args.height, ..BvhOptions::default() };
-    let job = Job::new();
+    if args.flatness.is_some() && args.volume != Volume::Rss {
+        return Err(CliError::BadArguments("--flatness goes with --volume rss only".to_owned()));
+    }
+    if let Some(flat) = args.flatness.filter(|flat| !(*flat > 0.0)) {
+        return Err(CliError::BadArguments(format!("--flatness is {flat}, it must be positive")));
+    }
+    let options = BvhOptions { height: args.height, flatness: args.flatness, ..BvhOptions::default() };
+    let job = super::job();
     let progress = ProgressLine::watch(&job);
     let surfaces = [Some((args.surface, first)), args.with.zip(second)];
     let surfaces = surfaces.into_iter().flatten();
@@ -127,16 +149,12 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
             tree.build_all(true, &job)?;
             let build_ms = milliseconds(start);
             let memory = tree.memory();
-            let parts = Parts {
-                nodes: memory.nodes,
-                node_bytes: memory.node_bytes,
-                tori: memory.tori,
-                torus_bytes: memory.torus_bytes,
-                other_bytes: memory.other_bytes,
-                levels: tree.summaries(),
-            };
+            if job.is_cancelled() {
+                return Ok(Exit::Cancelled);
+            }
+            let parts = Parts::new(&memory, tree.summaries());
             let (patches, bytes) = (tree.grid(), memory.total());
-            trees.push(Tree { surface: number, patches, build_ms, bytes, parts: Some(parts) });
+            trees.push(Tree { surface: number, patches, build_ms, bytes, parts });
             built.push(tree);
         }
         match (&built[..], args.with) {
@@ -163,8 +181,9 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
             let start = Instant::now();
             let tree = VolumeTree::build(surface, &options, args.volume.kind(), &job)?;
             let patches = surface.knots().each_ref().map(|k| k.breaks().len() - 1);
-            let (build_ms, bytes) = (milliseconds(start), tree.bytes());
-            trees.push(Tree { surface: number, patches, build_ms, bytes, parts: None });
+            let (build_ms, memory) = (milliseconds(start), tree.memory());
+            let parts = Parts::new(&memory, Vec::new());
+            trees.push(Tree { surface: number, patches, build_ms, bytes: memory.total(), parts });
             built.push(tree);
         }
         match (&built[..], args.with) {
@@ -209,24 +228,23 @@ fn say(output: &Output, common: &Common) {
             megabytes(tree.bytes),
             tree.build_ms
         ));
-        if let Some(parts) = &tree.parts {
+        let parts = &tree.parts;
+        common.say(format!(
+            "  {} nodes {:.3} MB, {} tori {:.3} MB, other {:.3} MB",
+            parts.nodes,
+            megabytes(parts.node_bytes),
+            parts.tori,
+            megabytes(parts.torus_bytes),
+            megabytes(parts.other_bytes)
+        ));
+        for level in &parts.levels {
             common.say(format!(
-                "  {} nodes {:.3} MB, {} tori {:.3} MB, other {:.3} MB",
-                parts.nodes,
-                megabytes(parts.node_bytes),
-                parts.tori,
-                megabytes(parts.torus_bytes),
-                megabytes(parts.other_bytes)
+                "  level {}: {} nodes, radius at most {:.3e}, torus deviation at most {}",
+                level.level,
+                level.nodes,
+                level.largest_radius,
+                level.largest_deviation.map_or("-".to_owned(), |d| format!("{d:.3e}"))
             ));
-            for level in &parts.levels {
-                common.say(format!(
-                    "  level {}: {} nodes, radius at most {:.3e}, torus deviation at most {}",
-                    level.level,
-                    level.nodes,
-                    level.largest_radius,
-                    level.largest_deviation.map_or("-".to_owned(), |d| format!("{d:.3e}"))
-                ));
-            }
         }
     }
     if let Some(pair) = &output.pair {

@@ -166,7 +166,10 @@ impl SurfaceTree {
         let grid = surface.knots().each_ref().map(|k| k.breaks().len() - 1);
         let origin = surface.bounds().center();
         let top = top::build(&patches, grid, origin);
-        let matrix_bytes = size_of_val(&*matrices) + matrices.iter().map(|m| size_of_val(&m[..])).sum::<usize>();
+        // Shared by all patches; two counters come with it.
+        let matrix_bytes = 2 * size_of::<usize>()
+            + size_of_val(&*matrices)
+            + matrices.iter().map(|m| size_of_val(&m[..])).sum::<usize>();
         Ok(Self { patches, grid, top, origin, matrix_bytes, options: *options })
     }
 

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use super::build::direction;
 use super::hull::apart;
 use super::net::{General, Shape, plain_net, split};
+use super::patch_tree::Memory;
 use super::traverse::{Overlap, Pair};
 use super::tree::{BvhError, BvhOptions, NodeId, check};
 use crate::kernel::geom::{Aabb, Surface};
@@ -72,12 +73,20 @@ impl VolumeTree {
         Ok(Self { patches, top, height: options.height })
     }
 
-    /// Bytes on the heap.
-    pub fn bytes(&self) -> usize {
+    /// What the tree takes, counted as [`super::SurfaceTree::memory`] does: heap and the record itself.
+    pub fn memory(&self) -> Memory {
         let numbers: usize = self.patches.iter().map(|p| p.numbers.capacity() * size_of::<f32>()).sum();
-        numbers
-            + self.patches.capacity() * size_of::<PatchVolumes>()
-            + self.top.capacity() * size_of::<(Aabb, [NodeId; 2])>()
+        Memory {
+            nodes: self.top.len() + self.patches.len() * ((2 << (2 * self.height)) - 1),
+            node_bytes: numbers + self.top.capacity() * size_of::<(Aabb, [NodeId; 2])>(),
+            other_bytes: size_of::<Self>() + self.patches.capacity() * size_of::<PatchVolumes>(),
+            ..Memory::default()
+        }
+    }
+
+    /// All bytes of [`Self::memory`].
+    pub fn bytes(&self) -> usize {
+        self.memory().total()
     }
 
     /// All pairs of nodes of a quadtree level (or of leaves) whose volumes are within `margin`.
@@ -252,4 +261,56 @@ fn group(
     let [(x, c), (y, d)] = halves.map(|half| group(patches, width, half, top));
     top[at] = (x.union(&y), [c, d]);
     (top[at].0, NodeId { patch: NodeId::TOP, index: at as u32 })
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::super::tests::{Random, kinds, random_surface, samples};
+    use super::*;
+
+    /// The node of a patch's tree at a binary depth over local coordinates.
+    fn over(depth: u32, mut local: DVec2) -> u32 {
+        let mut index = 1;
+        for level in 0..depth {
+            let t = &mut local[direction(level as usize) as usize];
+            *t *= 2.0;
+            let upper = *t >= 1.0;
+            *t -= f64::from(u8::from(upper));
+            index = 2 * index + u32::from(upper);
+        }
+        index
+    }
+
+    #[test]
+    fn boxes_and_hulls_hold_the_points_of_every_kind_of_surface() {
+        let mut random = Random(51);
+        for surface_kind in kinds() {
+            let surface = random_surface(surface_kind, &mut random);
+            let pieces = surface.bezier_patches();
+            for kind in [VolumeKind::Aabb, VolumeKind::Hull] {
+                let options = BvhOptions { height: 3, ..BvhOptions::default() };
+                let tree = VolumeTree::build(&surface, &options, kind, &Job::new()).unwrap();
+                for uv in samples(&surface, 20, &mut random) {
+                    let inside = |p: &crate::kernel::geom::BezierPatch| p.low.cmple(uv).all() && uv.cmple(p.high).all();
+                    let at = pieces.iter().position(inside).unwrap();
+                    let local = (uv - pieces[at].low) / (pieces[at].high - pieces[at].low);
+                    let p = surface.eval(uv);
+                    // What evaluating the point rounds.
+                    let rounding = crate::kernel::tol::ROUNDING * surface.bounds().max_abs();
+                    for depth in 0..=6 {
+                        let id = NodeId { patch: at as u32, index: over(depth, local) };
+                        let out = match tree.volume(id) {
+                            Volume::Box(b) => b.distance_squared(p) > rounding * rounding,
+                            Volume::Hull { origin, numbers, slack } => {
+                                apart(numbers, &[0.0; 3], p - origin, slack + rounding)
+                            }
+                        };
+                        assert!(!out, "{surface_kind:?} {kind:?} depth {depth} at {uv}");
+                    }
+                }
+            }
+        }
+    }
 }
