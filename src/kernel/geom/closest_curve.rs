@@ -31,7 +31,7 @@ pub struct CurveFoot {
 
 /// The most pieces that one search looks at.
 pub const MAX_PIECES: usize = 4096;
-/// The most Newton steps of one polish.
+/// The most Newton steps of one polish; halving alone then leaves 1e-12 of the bounds.
 const MAX_STEPS: usize = 40;
 /// What the distance must be known to, relative to it and to the size of the coordinates.
 const CERTAIN: f64 = 1e-14;
@@ -92,16 +92,21 @@ fn to_segment(p: DVec3, a: DVec3, b: DVec3) -> f64 {
     p.distance(a + d * s)
 }
 
-/// The locally closest point to `p` between two parameters, from a start: Newton, halving where it leaves the bounds.
-pub fn closest_between(curve: &Curve, p: DVec3, bounds: [f64; 2], start: f64) -> CurveFoot {
-    let [mut low, mut high] = bounds;
+/// Where the squared length of a vector r is least between two parameters, from a start: Newton, halving where it
+/// leaves the bounds. `at` gives r with its first and second derivative; it ends with a step that moves r by less
+/// than `close`. The parameter and the length.
+pub(crate) fn descend(
+    at: impl Fn(f64) -> [DVec3; 3],
+    [mut low, mut high]: [f64; 2],
+    start: f64,
+    close: f64,
+) -> (f64, f64) {
     let mut t = start.clamp(low, high);
-    let mut best = CurveFoot { t, point: curve.eval(t), distance: f64::INFINITY, lower: 0.0 };
+    let mut best = (t, f64::INFINITY);
     for _ in 0..MAX_STEPS {
-        let [c, d, dd, _] = curve.derivatives(t, 2);
-        let r = c - p;
-        if r.length() < best.distance {
-            best = CurveFoot { t, point: c, distance: r.length(), lower: 0.0 };
+        let [r, d, dd] = at(t);
+        if r.length() < best.1 {
+            best = (t, r.length());
         }
         let slope = r.dot(d);
         if slope > 0.0 {
@@ -112,13 +117,27 @@ pub fn closest_between(curve: &Curve, p: DVec3, bounds: [f64; 2], start: f64) ->
         let bend = d.length_squared() + r.dot(dd);
         let next = if bend > 0.0 { t - slope / bend } else { f64::NAN };
         let next = if next > low && next < high { next } else { 0.5 * (low + high) };
-        let rounding = 4.0 * f64::EPSILON * (c.abs().max_element() + p.abs().max_element());
-        if (next - t).abs() * d.length() <= rounding || next == t {
+        if (next - t).abs() * d.length() <= close || next == t {
             break;
         }
         t = next;
     }
     best
+}
+
+/// The locally closest point to `p` between two parameters, from a start.
+pub fn closest_between(curve: &Curve, p: DVec3, bounds: [f64; 2], start: f64) -> CurveFoot {
+    let at = |t: f64| {
+        let [c, d, dd, _] = curve.derivatives(t, 2);
+        [c - p, d, dd]
+    };
+    let (t, distance) = descend(at, bounds, start, rounding(curve, p));
+    CurveFoot { t, point: curve.eval(t), distance, lower: 0.0 }
+}
+
+/// What an evaluation of the curve, less `p`, can be off by.
+fn rounding(curve: &Curve, p: DVec3) -> f64 {
+    4.0 * f64::EPSILON * (curve.bounds().max_abs() + p.abs().max_element())
 }
 
 /// The closest point of a whole curve to `p`.

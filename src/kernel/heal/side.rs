@@ -7,6 +7,7 @@
 use glam::DVec3;
 
 use crate::kernel::geom::arc_length::ArcLength;
+use crate::kernel::geom::closest_curve::descend;
 use crate::kernel::geom::{Aabb, Curve};
 
 /// Why pieces are no side.
@@ -41,8 +42,6 @@ pub enum SideError {
 const UNMOVED: f64 = 1e-14;
 /// Places that are tried before Newton looks for the nearest point of a part of a piece.
 const PLACES: usize = 8;
-/// The most steps that it takes; halving alone then leaves 1e-12 of the part.
-const MAX_STEPS: usize = 40;
 
 #[derive(Clone, Debug)]
 struct Piece {
@@ -74,7 +73,7 @@ impl Piece {
     /// The distance of `p` from the part between two lengths, which is short enough to have one nearest point.
     fn distance(&self, p: DVec3, within: [f64; 2]) -> f64 {
         let [a, b] = within.map(|s| self.parameter(s));
-        let (mut low, mut high) = (a.min(b), a.max(b));
+        let (low, high) = (a.min(b), a.max(b));
         let moved = self.shift.iter().any(|s| s.length() > UNMOVED * self.arc.length());
         let way = if self.reversed { -1.0 } else { 1.0 };
         let drift = (self.shift[1] - self.shift[0]) / self.arc.length() * way;
@@ -92,28 +91,9 @@ impl Piece {
         let place = |k: usize| low + (high - low) * k as f64 / PLACES as f64;
         let squared = |k: usize| at(place(k))[0].length_squared();
         let best = (0..=PLACES).map(|k| (squared(k), k)).min_by(|x, y| x.0.total_cmp(&y.0));
-        let Some((mut least, k)) = best else { return f64::INFINITY };
-        let mut t = place(k);
-        (low, high) = (place(k.saturating_sub(1)), place((k + 1).min(PLACES)));
-        for _ in 0..MAX_STEPS {
-            let [r, d, dd] = at(t);
-            least = least.min(r.length_squared());
-            let slope = r.dot(d);
-            if slope > 0.0 {
-                high = t;
-            } else {
-                low = t;
-            }
-            // A step of h moves the squared distance by less than (h d)^2.
-            let bend = d.length_squared() + r.dot(dd);
-            let next = if bend > 0.0 { t - slope / bend } else { f64::NAN };
-            let next = if next > low && next < high { next } else { 0.5 * (low + high) };
-            if (next - t).powi(2) * d.length_squared() <= 1e-14 * least || next == t {
-                break;
-            }
-            t = next;
-        }
-        least.sqrt()
+        let Some((_, k)) = best else { return f64::INFINITY };
+        let around = [place(k.saturating_sub(1)), place((k + 1).min(PLACES))];
+        descend(at, around, place(k), 4.0 * f64::EPSILON * p.abs().max_element()).1
     }
 
     fn turn(&mut self) {
