@@ -219,8 +219,10 @@ fn two_surfaces(table: &mut Table, [a, b]: [&Surface; 2]) -> Result<(), Box<dyn 
     Ok(())
 }
 
-/// Two sides of a shared case: all surfaces of a side with all of the other.
-fn pairs(name: &str) -> Result<Option<Vec<[Arc<Surface>; 2]>>, Box<dyn Error>> {
+type Pairs = Vec<[Arc<Surface>; 2]>;
+
+/// Two sides of a shared case: all surfaces of a side with all of the other. None without the data.
+fn pairs(name: &str) -> Result<Option<Pairs>, Box<dyn Error>> {
     let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data/cases"));
     let file = folder.join(format!("{name}.igs"));
     if !file.exists() {
