@@ -10,8 +10,10 @@ use std::time::{Duration, Instant};
 use egui::{Event, Key, Modifiers, PointerButton, Pos2, pos2};
 use egui_kittest::kittest::Queryable;
 use egui_kittest::{Harness, HarnessBuilder};
+use glam::DVec3;
 use patchwright::render::Gpu;
-use patchwright::ui::{App, Options};
+use patchwright::ui::{Action, App, Numpad, Options, Page, Tool};
+use patchwright::view::patch_tool::Event as PatchEvent;
 
 type Window = Harness<'static, App>;
 
@@ -159,6 +161,223 @@ fn discarding_and_leaving_change_nothing() {
     assert!(!window.state().editor.history.is_dirty());
 }
 
+/// Types a path into the save dialog and saves there.
+fn save_as(window: &mut Window, path: &Path) {
+    key(window, Modifiers::COMMAND, Key::A);
+    window.event(Event::Text(path.display().to_string()));
+    window.step();
+    key(window, Modifiers::NONE, Key::Enter);
+    settle(window);
+    assert!(path.exists(), "{}", path.display());
+}
+
+#[test]
+fn the_saved_specification_heals_the_same_bits_from_the_command_line() {
+    let mut window = opened("surfaces_with_gap.igs");
+    key(&mut window, Modifiers::NONE, Key::P);
+    // Options that are not the defaults must come along.
+    let Tool::Patch(session) = &window.state().editor.tool else { panic!() };
+    let mut options = session.tool.options().clone();
+    (options.tol, options.neighbours, options.min_resolution) = (0.3 * options.tol, 6, 6);
+    window.state_mut().editor.patch_event(PatchEvent::Options(Box::new(options)));
+    for curve in ["border u min", "border v min", "border u max", "border v max"] {
+        pick(&mut window, "left panel", curve);
+    }
+    for _ in 0..3 {
+        key(&mut window, Modifiers::NONE, Key::Enter);
+    }
+    assert_eq!(patches(&window), 1, "{}", prompt(&window));
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let ctx = window.ctx.clone();
+    window.state_mut().editor.perform(&ctx, Action::SaveSpec);
+    settle(&mut window);
+    save_as(&mut window, &path("session.ron"));
+    let text = std::fs::read_to_string(path("session.ron")).unwrap();
+    assert!(text.contains("neighbours: 6") && text.contains("min_resolution: 6"), "{text}");
+
+    let out = std::process::Command::new(env!("CARGO_BIN_EXE_patchwright"))
+        .arg("heal")
+        .arg(asset("surfaces_with_gap.igs"))
+        .arg("--patches")
+        .arg(path("session.ron"))
+        .arg("--out")
+        .arg(path("again.patchwright.ron"))
+        .output()
+        .unwrap();
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let again = patchwright::io::open(&path("again.patchwright.ron")).unwrap().document;
+    let bits = |document: &patchwright::model::document::Document| -> Vec<u64> {
+        let (_, patch) = document.patches().next().unwrap();
+        patch.surface.points().iter().flat_map(|p| p.to_array().map(f64::to_bits)).collect()
+    };
+    assert_eq!(bits(&again), bits(window.state().editor.document()));
+}
+
+#[test]
+fn an_accepted_patch_is_adjusted_in_its_place() {
+    let mut window = opened("surfaces_with_gap.igs");
+    heal_left_panel(&mut window);
+    key(&mut window, Modifiers::NONE, Key::Enter);
+    key(&mut window, Modifiers::NONE, Key::Escape);
+    let before = window.state().editor.document().patches().next().map(|(id, p)| (id, p.clone())).unwrap();
+    window.state_mut().editor.selection.set([before.0]);
+    key(&mut window, Modifiers::NONE, Key::E);
+    assert!(prompt(&window).starts_with("Patch · Four sides"), "{}", prompt(&window));
+    let Tool::Patch(session) = &window.state().editor.tool else { panic!() };
+    let mut options = session.tool.options().clone();
+    assert_eq!(options.settings().with_patches(Vec::new()).tol, before.1.settings.tol);
+    options.min_resolution = 12;
+    window.state_mut().editor.patch_event(PatchEvent::Options(Box::new(options)));
+    settle(&mut window);
+    key(&mut window, Modifiers::NONE, Key::Enter);
+    key(&mut window, Modifiers::NONE, Key::Enter);
+    let after: Vec<_> = window.state().editor.document().patches().map(|(id, p)| (id, p.clone())).collect();
+    assert_eq!(after.len(), 1, "{}", prompt(&window));
+    assert_eq!(after[0].0, before.0);
+    assert_ne!(after[0].1.report.resolution, before.1.report.resolution);
+    key(&mut window, Modifiers::NONE, Key::Escape);
+    key(&mut window, Modifiers::COMMAND, Key::Z);
+    let (_, undone) = window.state().editor.document().patches().next().unwrap();
+    assert!(std::sync::Arc::ptr_eq(undone, &before.1));
+}
+
+#[test]
+fn a_heal_that_is_cancelled_offers_what_it_had() {
+    let mut window = opened("oscillating_surfaces.igs");
+    key(&mut window, Modifiers::NONE, Key::P);
+    let example = patchwright::model::examples::all().into_iter().find(|e| e.name == "oscillating_surfaces").unwrap();
+    // So fine that it takes its time.
+    let mut settings = example.spec.settings();
+    (settings.tol, settings.max_resolution) = (Some(1e-13), 1024);
+    let patch = example.spec.patches[0].clone();
+    window.state_mut().editor.patch_event(PatchEvent::StartWith(Box::new(patch), Box::new(settings)));
+    settle(&mut window);
+    window.event(Event::Key {
+        key: Key::Enter,
+        physical_key: None,
+        pressed: true,
+        repeat: false,
+        modifiers: Modifiers::NONE,
+    });
+    window.step();
+    // Until the first resolutions are done.
+    let start = Instant::now();
+    let healing = |window: &Window| {
+        let active = window.state().editor.jobs.active();
+        active.iter().find(|j| j.name.starts_with("Heal")).map(|j| j.job.current_phase())
+    };
+    let deep = |phase: Option<String>| {
+        phase.and_then(|p| p.strip_prefix("Resolution ")?.parse::<usize>().ok()).is_some_and(|n| n >= 32)
+    };
+    while !deep(healing(&window)) {
+        window.step();
+        assert!(start.elapsed() < Duration::from_secs(60), "{}", prompt(&window));
+    }
+    let asked = Instant::now();
+    window.event(Event::Key {
+        key: Key::Escape,
+        physical_key: None,
+        pressed: true,
+        repeat: false,
+        modifiers: Modifiers::NONE,
+    });
+    window.step();
+    assert!(prompt(&window).starts_with("Patch · Four sides"), "acknowledged in the same frame: {}", prompt(&window));
+    let acknowledged = asked.elapsed();
+    while healing(&window).is_some() {
+        window.step();
+    }
+    eprintln!("cancel: shown after {acknowledged:.1?}, ended after {:.1?}", asked.elapsed());
+    settle(&mut window);
+    assert!(window.query_by_label("Keep partial").is_some());
+    picture(&mut window, "editor_partial");
+    window.get_by_label("Keep partial").click();
+    settle(&mut window);
+    assert!(prompt(&window).contains("in part"), "{}", prompt(&window));
+    key(&mut window, Modifiers::NONE, Key::Enter);
+    let (_, patch) = window.state().editor.document().patches().next().unwrap();
+    assert!(patch.report.incomplete && !patch.report.history.is_empty());
+    window.state_mut().editor.show_page(Page::Patches);
+    settle(&mut window);
+    assert!(window.query_by_label_contains("(incomplete)").is_some());
+}
+
+#[test]
+fn the_numeric_pad_turns_the_view_and_plain_digits_go_to_the_tool() {
+    let pad = Numpad::default();
+    let options = Options { files: vec![asset("surfaces_with_gap.igs")], numpad: pad.clone(), ..Options::default() };
+    let mut window = window(builder(), options);
+    let press = |window: &mut Window, digit: Key, modifiers: Modifiers, on_pad: bool| {
+        for pressed in [true, false] {
+            pad.note(digit, pressed, on_pad);
+            window.event(Event::Key { key: digit, physical_key: Some(digit), pressed, repeat: false, modifiers });
+        }
+        settle(window);
+    };
+    let forward = |window: &Window| window.state().editor.viewport.camera.forward();
+    let start = forward(&window);
+    for digit in [Key::Num1, Key::Num3, Key::Num5, Key::Num7] {
+        press(&mut window, digit, Modifiers::NONE, false);
+    }
+    assert_eq!(forward(&window), start, "no tool is on, but plain digits are no views");
+    for (digit, modifiers, along) in [
+        (Key::Num1, Modifiers::NONE, DVec3::Y),
+        (Key::Num1, Modifiers::COMMAND, DVec3::NEG_Y),
+        (Key::Num3, Modifiers::NONE, DVec3::NEG_X),
+        (Key::Num3, Modifiers::COMMAND, DVec3::X),
+        (Key::Num7, Modifiers::NONE, DVec3::NEG_Z),
+        (Key::Num7, Modifiers::COMMAND, DVec3::Z),
+    ] {
+        press(&mut window, digit, modifiers, true);
+        assert!(forward(&window).distance(along) < 1e-9, "{digit:?} {modifiers:?}: {}", forward(&window));
+    }
+    let projection = window.state().editor.viewport.camera.projection;
+    press(&mut window, Key::Num5, Modifiers::NONE, true);
+    assert_ne!(window.state().editor.viewport.camera.projection, projection);
+    key(&mut window, Modifiers::NONE, Key::P);
+    let before = forward(&window);
+    press(&mut window, Key::Num3, Modifiers::NONE, false);
+    assert_eq!((forward(&window), prompt(&window).as_str()), (before, "Patch · Pick side 3 of 4"));
+    press(&mut window, Key::Num1, Modifiers::NONE, true);
+    assert!(forward(&window).distance(DVec3::Y) < 1e-9 && prompt(&window).contains("side 3"));
+}
+
+#[test]
+fn holding_still_lists_what_is_under_the_cursor_and_the_filter_narrows_it() {
+    let mut window = opened("surfaces_with_gap.igs");
+    let at = window.state().editor.viewport.rect.center();
+    let hold = |window: &mut Window| {
+        window.event(Event::PointerMoved(at));
+        window.step();
+        let button = |pressed| Event::PointerButton {
+            pos: at,
+            button: PointerButton::Primary,
+            pressed,
+            modifiers: Modifiers::NONE,
+        };
+        window.event(button(true));
+        for _ in 0..60 {
+            window.step();
+        }
+        window.event(button(false));
+        window.step();
+    };
+    hold(&mut window);
+    assert!(window.state().editor.pick_list.is_some() && window.state().editor.selection.is_empty());
+    key(&mut window, Modifiers::NONE, Key::Escape);
+    for kind in ["Curves", "Surfaces"] {
+        window.get_by_label(kind).click();
+        settle(&mut window);
+    }
+    click(&mut window, at);
+    assert!(window.state().editor.selection.is_empty(), "nothing that may be picked is there");
+    window.get_by_label("Surfaces").click();
+    settle(&mut window);
+    click(&mut window, at);
+    assert_eq!(window.state().editor.selection.ids().len(), 1);
+}
+
 #[test]
 fn every_menu_opens_and_every_action_in_it_has_a_name() {
     let mut window = opened("surfaces_with_gap.igs");
@@ -248,25 +467,88 @@ fn a_file_that_cannot_be_read_is_explained_and_the_model_stays() {
     assert_eq!(window.state().editor.document().surfaces().count(), 2);
 }
 
-#[test]
-fn unsaved_work_is_asked_about_and_recovered_after_a_crash() {
-    let folder = tempfile::tempdir().unwrap();
-    let journal = patchwright::io::autosave::Journal::at(folder.path());
-    let options =
-        Options { files: vec![asset("surfaces_with_gap.igs")], journal: Some(journal.clone()), ..Options::default() };
+/// Opens a model with a journal in a folder, hides a panel, deletes nothing else, and waits until that is put aside.
+fn changed_and_autosaved(folder: &Path) -> Window {
+    let journal = patchwright::io::autosave::Journal::at(folder);
+    let options = Options { files: vec![asset("surfaces_with_gap.igs")], journal: Some(journal), ..Options::default() };
     let mut window = window(builder(), options);
     window.get_by_label("right panel").click();
     settle(&mut window);
     key(&mut window, Modifiers::NONE, Key::Delete);
+    key(&mut window, Modifiers::COMMAND, Key::A);
+    key(&mut window, Modifiers::NONE, Key::H);
     let start = Instant::now();
     while !window.state().editor.is_autosaved() {
         settle(&mut window);
         assert!(start.elapsed() < Duration::from_secs(20), "never autosaved");
     }
+    window
+}
+
+#[test]
+fn unsaved_work_is_asked_about_before_quitting() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut window = changed_and_autosaved(folder.path());
     key(&mut window, Modifiers::COMMAND, Key::Q);
     assert!(window.query_by_label_contains("Save the changes?").is_some());
-    // While the session runs nothing is to be recovered; a crash is a session that never said goodbye.
-    assert!(journal.recoverable().is_empty());
+    // While the session runs nothing is to be recovered.
+    assert!(patchwright::io::autosave::Journal::at(folder.path()).recoverable().is_empty());
+}
+
+const CRASH: &str = "PATCHWRIGHT_TEST_CRASH_IN";
+
+/// Not a test of its own: the process that [`a_killed_session_is_offered_and_comes_back_as_it_was`] kills.
+#[test]
+fn a_session_that_will_be_killed() {
+    let Some(folder) = std::env::var_os(CRASH) else { return };
+    let window = changed_and_autosaved(Path::new(&folder));
+    let text = patchwright::io::project::write(window.state().editor.document()).unwrap();
+    // What the document was goes to the parent in one step, which is the sign to kill.
+    std::fs::write(Path::new(&folder).join("written"), text).unwrap();
+    std::fs::rename(Path::new(&folder).join("written"), Path::new(&folder).join("expected")).unwrap();
+    std::thread::sleep(Duration::from_secs(60));
+}
+
+#[test]
+fn a_killed_session_is_offered_and_comes_back_as_it_was() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut child = std::process::Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "a_session_that_will_be_killed", "--nocapture"])
+        .env(CRASH, folder.path())
+        .stdout(std::process::Stdio::null())
+        .stderr(std::process::Stdio::null())
+        .spawn()
+        .unwrap();
+    let (start, expected) = (Instant::now(), folder.path().join("expected"));
+    while !expected.exists() {
+        assert!(start.elapsed() < Duration::from_secs(60), "the session never got as far");
+        assert!(child.try_wait().unwrap().is_none(), "the session ended by itself");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let expected = std::fs::read_to_string(expected).unwrap();
+
+    let journal = patchwright::io::autosave::Journal::at(folder.path());
+    let options =
+        || Options { files: vec![asset("part_of_a_patch.igs")], journal: Some(journal.clone()), ..Options::default() };
+    let mut after = window(builder(), options());
+    assert!(after.query_by_label_contains("surfaces_with_gap").is_some(), "the file of the lost session is named");
+    assert!(after.query_by_label_contains("2 changes").is_some(), "and how much was done");
+    picture(&mut after, "editor_recovery");
+    after.get_by_label_contains("Recover").click();
+    settle(&mut after);
+    let editor = &after.state().editor;
+    assert_eq!(patchwright::io::project::write(editor.document()).unwrap(), expected);
+    assert!(editor.history.is_dirty(), "it is in no file of the user's yet");
+    let hidden = editor.document().entities().iter().filter(|e| !e.visible).count();
+    assert_eq!((editor.document().entities().len(), hidden), (1, 1));
+    // Until it is saved, it stays safe: killed again, it is offered again.
+    let start = Instant::now();
+    while !after.state().editor.is_autosaved() {
+        settle(&mut after);
+        assert!(start.elapsed() < Duration::from_secs(20), "never autosaved");
+    }
 }
 
 #[test]

@@ -55,18 +55,15 @@ fn spec(document: &Document, u: [f64; 2], v: [f64; 2], tol: f64) -> HealSpec {
         iso(document, IsoAt::U(u[0]), v[0], v[1]),
     ];
     HealSpec {
-        joining_tol: None,
         tol: Some(tol),
-        max_resolution: 128,
         onto: Some(vec![0, 1, 2, 3]),
-        slab: None,
-        neighbours: 8,
         patches: vec![PatchSpec {
             name: "wavy".into(),
             boundary: [BoundaryMode::Keep; 4],
             sides,
             ..PatchSpec::default()
         }],
+        ..HealSpec::default()
     }
 }
 

@@ -86,7 +86,7 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         if !(tol > 0.0 && tol.is_finite()) {
             return Err(CliError::BadArguments(format!("--tol is {tol}, it must be a positive length")));
         }
-        spec.tol = Some(tol);
+        spec.set_tol(tol);
     }
     let document = io::open(&args.file)?.document;
     let job = super::job();

@@ -7,6 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::model::document::Document;
+use crate::model::spec::HealSpec;
 
 pub(crate) mod atomic;
 pub mod autosave;
@@ -171,6 +172,15 @@ pub fn open(path: &Path) -> Result<Opened, OpenError> {
         // Nothing in a Plot3D file says what it is, and its extension may be anything.
         None => discrete::open(&bytes, Format::Plot3d).map_err(|_| OpenError::Unknown { path: path.into() }),
     }
+}
+
+/// Writes a patch specification, in one step: on an error the file that was there before is untouched.
+pub fn save_spec(path: &Path, spec: &HealSpec) -> Result<(), SaveError> {
+    let text = spec.to_ron().map_err(|error| SaveError::Project {
+        path: path.into(),
+        source: project::ProjectWriteError(error.to_string()),
+    })?;
+    Ok(atomic::write(path, text.as_bytes())?)
 }
 
 /// Writes a document, in one step: on an error the file that was there before is untouched.

@@ -19,7 +19,7 @@ use super::{ImportReport, Opened, Severity};
 use crate::kernel::geom::{Curve, Knots, Surface};
 use crate::kernel::mesh::facets::{Facets, FacetsData};
 use crate::model::document::{Document, Entity, EntityId, Patch, Shape, Unit};
-use crate::model::spec::{PatchReport, PatchSpec};
+use crate::model::spec::{HealSpec, PatchReport, PatchSpec};
 
 /// The version that is written. Older versions are read, later ones refused.
 pub const VERSION: u32 = 2;
@@ -89,6 +89,7 @@ enum ShapeOut<'a> {
 struct PatchOut<'a> {
     surface: &'a Surface,
     spec: &'a PatchSpec,
+    settings: &'a HealSpec,
     report: &'a PatchReport,
 }
 
@@ -151,6 +152,8 @@ struct CurveIn {
 struct PatchIn {
     surface: SurfaceIn,
     spec: PatchSpec,
+    #[serde(default)]
+    settings: HealSpec,
     report: PatchReport,
 }
 
@@ -183,7 +186,12 @@ impl ShapeIn {
             Self::Block(data) => Shape::Block(Arc::new(Facets::try_from(data).map_err(|e| e.to_string())?)),
             Self::Patch(patch) => {
                 let surface = patch.surface.checked()?;
-                Shape::Patch(Arc::new(Patch { surface, spec: patch.spec, report: patch.report }))
+                Shape::Patch(Arc::new(Patch {
+                    surface,
+                    spec: patch.spec,
+                    settings: patch.settings,
+                    report: patch.report,
+                }))
             }
         })
     }
@@ -212,7 +220,8 @@ impl<'a> EntityOut<'a> {
             Shape::Mesh(facets) => ShapeOut::Mesh(facets),
             Shape::Block(facets) => ShapeOut::Block(facets),
             Shape::Patch(patch) => {
-                ShapeOut::Patch(PatchOut { surface: &patch.surface, spec: &patch.spec, report: &patch.report })
+                let Patch { surface, spec, settings, report } = patch.as_ref();
+                ShapeOut::Patch(PatchOut { surface, spec, settings, report })
             }
         };
         let (id, name, visible, color) = (entity.id.0, entity.name.as_str(), entity.visible, entity.color);
@@ -307,7 +316,8 @@ mod tests {
             history: vec![HealStep { resolution: [8, 9], max_error: third }],
             ..PatchReport::default()
         };
-        document.add("patch", Shape::Patch(Arc::new(Patch { surface, spec, report })), None);
+        let settings = HealSpec { tol: Some(third), onto: Some(vec![0, 2]), ..HealSpec::default() };
+        document.add("patch", Shape::Patch(Arc::new(Patch { surface, spec, settings, report })), None);
         document.retain(|e| e.name != "deleted");
         document
     }
@@ -327,6 +337,7 @@ mod tests {
         }
         let patch = |d: &Document| d.patches().next().map(|(_, p)| Arc::clone(p)).unwrap();
         assert_eq!(patch(&document).spec, patch(&back).spec);
+        assert_eq!(patch(&document).settings, patch(&back).settings);
         assert_eq!(patch(&document).report, patch(&back).report);
         let bits = |d: &Document| -> Vec<u64> {
             let surface = d.surfaces().next().unwrap().1;

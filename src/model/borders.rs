@@ -8,8 +8,8 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::document::Document;
-use crate::kernel::geom::{Aabb, Curve, Side};
+use super::document::{Document, EntityId};
+use crate::kernel::geom::{Aabb, Curve, Side, Surface};
 
 /// Samples of a border at which its distance to the others is measured.
 pub const SAMPLES: usize = 17;
@@ -62,10 +62,29 @@ struct Candidate {
 /// The borders of all original surfaces, four for each in the order of [`Side::ALL`]. Two borders are one where
 /// they are at most `joining` apart.
 pub fn borders(document: &Document, joining: f64) -> Vec<Border> {
-    let candidates: Vec<Candidate> = document
-        .surfaces()
+    borders_of(document.surfaces().map(|(_, shape)| shape.as_ref()), joining)
+}
+
+/// How far the borders of each healed patch are from those of other patches that they run along; `None` for a patch
+/// that has no neighbour. Two borders run along each other where they are at most `joining` apart.
+pub fn seam_gaps(document: &Document, joining: f64) -> Vec<(EntityId, Option<f64>)> {
+    let mut gaps: Vec<(EntityId, Option<f64>)> = document.patches().map(|(id, _)| (id, None)).collect();
+    let found = borders_of(document.patches().map(|(_, patch)| patch.surface.as_ref()), joining);
+    for border in found {
+        if let Meets::Shared { gap } | Meets::Partly { gap, .. } = border.meets
+            && let Some((_, widest)) = gaps.get_mut(border.surface)
+        {
+            *widest = Some(widest.unwrap_or(0.0).max(gap));
+        }
+    }
+    gaps
+}
+
+/// The borders of some surfaces, numbered as they come.
+fn borders_of<'a>(surfaces: impl Iterator<Item = &'a Surface>, joining: f64) -> Vec<Border> {
+    let candidates: Vec<Candidate> = surfaces
         .enumerate()
-        .flat_map(|(surface, (_, shape))| {
+        .flat_map(|(surface, shape)| {
             Side::ALL.into_iter().filter_map(move |side| {
                 let curve = shape.border(side).ok()?; // fails on no valid surface
                 let polyline = curve.sampled(PER_SPAN);
@@ -148,8 +167,8 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::kernel::geom::{Surface, sweep};
-    use crate::model::document::{Shape, Unit};
+    use crate::kernel::geom::sweep;
+    use crate::model::document::{Patch, Shape, Unit};
 
     fn document(surfaces: Vec<Surface>) -> Document {
         let mut document = Document::new(Unit::Unknown);
@@ -201,6 +220,22 @@ mod tests {
         let found = borders(&document(vec![left, low]), 1e-6);
         let Meets::Partly { share, gap } = found[1].meets else { panic!("{:?}", found[1]) };
         assert!((share - 0.35).abs() < 1.0 / SAMPLES as f64 && gap < 1e-14);
+    }
+
+    #[test]
+    fn seams_of_patches_have_their_gap_and_surfaces_do_not_count() {
+        let lift = 2e-4;
+        let mut model = document(vec![saddle([2.0, 3.0], [0.0, 1.0], 0.0)]);
+        let shapes = [saddle([0.0, 1.0], [0.0, 1.0], 0.0), saddle([1.0, 2.0], [0.0, 1.0], lift)];
+        for surface in shapes {
+            let (spec, settings, report) = Default::default();
+            let patch = Patch { surface: Arc::new(surface), spec, settings, report };
+            model.add("p", Shape::Patch(Arc::new(patch)), None);
+        }
+        let expected = lift / 2f64.sqrt();
+        let found = seam_gaps(&model, 1e-3);
+        assert!(found.len() == 2 && found.iter().all(|(_, g)| g.is_some_and(|g| (g - expected).abs() < 1e-12)));
+        assert!(seam_gaps(&model, 1e-5).iter().all(|(_, g)| g.is_none()));
     }
 
     #[test]

@@ -48,10 +48,13 @@ pub enum Command {
         /// The unit.
         unit: Unit,
     },
-    /// Adds healed patches, all at once so that one undo takes back one heal.
-    AddPatches {
-        /// Names and patches.
-        patches: Vec<(String, Patch)>,
+    /// Adds healed patches and puts others, which were healed together with them or anew, in the places of the patches that they
+    /// come from: all at once, so that one undo takes back one heal.
+    Heal {
+        /// Names and patches that are new.
+        added: Vec<(String, Patch)>,
+        /// Patches that keep their id; one whose specification has another name than before gets that name.
+        replaced: Vec<(EntityId, Arc<Patch>)>,
     },
     /// Adds free curves.
     AddCurves {
@@ -62,13 +65,6 @@ pub enum Command {
     AddSurfaces {
         /// Names and surfaces.
         surfaces: Vec<(String, Arc<Surface>)>,
-    },
-    /// Puts another patch in the place of one, under the same id.
-    ReplacePatch {
-        /// Which one.
-        id: EntityId,
-        /// What takes its place.
-        patch: Arc<Patch>,
     },
 }
 
@@ -112,13 +108,13 @@ impl Command {
             Self::SetColor { ids, .. } => count("Colour", ids.len()),
             Self::SetUnit { unit } if unit.symbol().is_empty() => "Unset unit".to_owned(),
             Self::SetUnit { unit } => format!("Set unit to {}", unit.symbol()),
-            Self::AddPatches { patches } => match patches.as_slice() {
-                [(name, _)] => format!("Add patch {name}"),
-                _ => format!("Add {} patches", patches.len()),
+            Self::Heal { added, replaced } => match (added.as_slice(), replaced.first()) {
+                ([], Some((_, patch))) => format!("Adjust patch {}", patch.spec.name),
+                ([(name, _)], _) => format!("Add patch {name}"),
+                _ => format!("Add {} patches", added.len()),
             },
             Self::AddCurves { curves } => format!("Add {} curves", curves.len()),
             Self::AddSurfaces { surfaces } => format!("Add {} surfaces", surfaces.len()),
-            Self::ReplacePatch { .. } => "Adjust patch".to_owned(),
         }
     }
 
@@ -174,8 +170,20 @@ impl Command {
                 }
             }
             Self::SetUnit { unit } => next.unit = *unit,
-            Self::AddPatches { patches } => {
-                for (name, patch) in patches {
+            Self::Heal { added, replaced } => {
+                for (id, patch) in replaced {
+                    all_there(&[*id])?;
+                    let Some(Shape::Patch(old)) = document.get(*id).map(|e| &e.shape) else {
+                        return Err(CommandError::NoPatch { id: id.0 });
+                    };
+                    next.edit(*id, |e| {
+                        if old.spec.name != patch.spec.name {
+                            e.name.clone_from(&patch.spec.name);
+                        }
+                        e.shape = Shape::Patch(Arc::clone(patch));
+                    });
+                }
+                for (name, patch) in added {
                     next.add(name.clone(), Shape::Patch(Arc::new(patch.clone())), None);
                 }
             }
@@ -188,13 +196,6 @@ impl Command {
                 for (name, surface) in surfaces {
                     next.add(name.clone(), Shape::Surface(Arc::clone(surface)), None);
                 }
-            }
-            Self::ReplacePatch { id, patch } => {
-                all_there(&[*id])?;
-                if !matches!(document.get(*id).map(|e| &e.shape), Some(Shape::Patch(_))) {
-                    return Err(CommandError::NoPatch { id: id.0 });
-                }
-                next.edit(*id, |e| e.shape = Shape::Patch(Arc::clone(patch)));
             }
         }
         Ok(next)

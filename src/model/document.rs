@@ -80,8 +80,11 @@ pub enum Shape {
 pub struct Patch {
     /// The B-spline surface (bicubic, C1, double interior knots).
     pub surface: Arc<Surface>,
-    /// What it was made from; running it again gives the same surface.
+    /// What it was made from; running it again with `settings`, together with the patches that it shares boundaries with,
+    /// gives the same surface.
     pub spec: super::spec::PatchSpec,
+    /// The settings of the heal that made it, without patches.
+    pub settings: super::spec::HealSpec,
     /// What was measured.
     pub report: super::spec::PatchReport,
 }

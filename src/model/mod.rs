@@ -6,6 +6,7 @@ pub mod document;
 pub mod examples;
 pub mod healing;
 pub mod history;
+pub mod replay;
 pub mod resolve;
 pub mod selection;
 pub mod spec;

@@ -8,10 +8,10 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
-use super::document::{Document, EntityId};
+use super::document::{Document, EntityId, Shape};
 use super::spec::{HealSpec, IsoAt, Piece};
 use crate::kernel::geom::arc_length::ArcLength;
-use crate::kernel::geom::{Curve, CurveError, Direction, Knots, Side, Surface};
+use crate::kernel::geom::{Aabb, Curve, CurveError, Direction, Knots, Side, Surface};
 use crate::kernel::heal::boundary_loop::LoopChoice;
 use crate::kernel::heal::fit::bezier_row;
 use crate::kernel::heal::hardy::HardyOptions;
@@ -177,14 +177,31 @@ pub fn resolve(spec: &HealSpec, document: &Document, job: &Job) -> Result<Resolv
 
 /// The kernel options of a specification; what it leaves out comes from the model's size.
 pub fn options(spec: &HealSpec, document: &Document) -> HealOptions {
-    let defaults = HealOptions::of(&document.bounds());
+    // Patches do not count: healing the same model again, with or without them, is done alike.
+    let originals = document.entities().iter().filter(|e| !matches!(e.shape, Shape::Patch(_)));
+    let defaults = HealOptions::of(&originals.fold(Aabb::EMPTY, |all, e| all.union(&e.bounds())));
     HealOptions {
         joining_tol: spec.joining_tol.unwrap_or(defaults.joining_tol),
         tol: spec.tol.unwrap_or(defaults.tol),
+        min_resolution: spec.min_resolution,
         max_resolution: spec.max_resolution,
         slab: spec.slab,
-        hardy: HardyOptions { neighbours: spec.neighbours, ..HardyOptions::default() },
+        hardy: HardyOptions { neighbours: spec.neighbours, r: spec.radius, gamma: spec.gamma },
+        chord_tol: spec.chord_tol.unwrap_or(defaults.chord_tol),
         ..defaults
+    }
+}
+
+/// The settings that a specification comes to for a document, with nothing left to defaults: written to a file, they
+/// heal the same whatever else the file holds.
+pub fn used(spec: &HealSpec, document: &Document) -> HealSpec {
+    let options = options(spec, document);
+    HealSpec {
+        joining_tol: Some(options.joining_tol),
+        tol: Some(options.tol),
+        onto: spec.onto.clone().or_else(|| Some((0..document.surfaces().count()).collect())),
+        chord_tol: Some(options.chord_tol),
+        ..spec.settings()
     }
 }
 

@@ -15,6 +15,9 @@ pub struct HealSpec {
     /// The largest error wanted, in model units. Default: 1e-4 of the diagonal.
     #[serde(default)]
     pub tol: Option<f64>,
+    /// The number of spans along each side that the refinement starts with.
+    #[serde(default = "default_min_resolution")]
+    pub min_resolution: usize,
     /// The largest number of spans along one side.
     #[serde(default = "default_max_resolution")]
     pub max_resolution: usize,
@@ -27,8 +30,40 @@ pub struct HealSpec {
     /// How many known projections an artificial one is made from (K of HJR99 (12)).
     #[serde(default = "default_neighbours")]
     pub neighbours: usize,
-    /// The patches.
+    /// The exponent of HJR99 (12).
+    #[serde(default = "default_gamma")]
+    pub gamma: f64,
+    /// R of HJR99 (12); half the sum of the mean parameter spacings when left out.
+    #[serde(default)]
+    pub radius: Option<f64>,
+    /// How far the triangles that find projections may be off the surfaces, in model units. Projections lie on the
+    /// surfaces themselves, but which one is nearest depends on it in the last bits. Default: 5e-4 of the diagonal.
+    #[serde(default)]
+    pub chord_tol: Option<f64>,
+    /// The patches. They are healed together: those that share a boundary agree along it bit for bit.
     pub patches: Vec<PatchSpec>,
+    /// Further heals of the same model, each on its own and with its own settings.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub then: Vec<HealSpec>,
+}
+
+impl Default for HealSpec {
+    fn default() -> Self {
+        Self {
+            joining_tol: None,
+            tol: None,
+            min_resolution: default_min_resolution(),
+            max_resolution: default_max_resolution(),
+            onto: None,
+            slab: None,
+            neighbours: default_neighbours(),
+            gamma: default_gamma(),
+            radius: None,
+            chord_tol: None,
+            patches: Vec::new(),
+            then: Vec::new(),
+        }
+    }
 }
 
 /// Why a text is no patch specification.
@@ -44,6 +79,30 @@ pub struct SpecError {
 }
 
 impl HealSpec {
+    /// The settings alone.
+    #[must_use]
+    pub fn settings(&self) -> Self {
+        Self { onto: self.onto.clone(), patches: Vec::new(), then: Vec::new(), ..*self }
+    }
+
+    /// The same settings for other patches.
+    #[must_use]
+    pub fn with_patches(&self, patches: Vec<PatchSpec>) -> Self {
+        Self { patches, ..self.settings() }
+    }
+
+    /// This heal and those after it, each alone; those without patches are left out.
+    pub fn heals(&self) -> Vec<Self> {
+        let own = (!self.patches.is_empty()).then(|| self.with_patches(self.patches.clone()));
+        own.into_iter().chain(self.then.iter().flat_map(Self::heals)).collect()
+    }
+
+    /// Changes the wanted error of this heal and those after it.
+    pub fn set_tol(&mut self, tol: f64) {
+        self.tol = Some(tol);
+        self.then.iter_mut().for_each(|spec| spec.set_tol(tol));
+    }
+
     /// Reads a specification. Options may be written without `Some`.
     pub fn from_ron(text: &str) -> Result<Self, SpecError> {
         ron_options().from_str(text).map_err(|error| SpecError {
@@ -81,8 +140,16 @@ mod four {
     }
 }
 
+fn default_min_resolution() -> usize {
+    8
+}
+
 fn default_max_resolution() -> usize {
     128
+}
+
+fn default_gamma() -> f64 {
+    0.001
 }
 
 fn default_neighbours() -> usize {

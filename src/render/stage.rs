@@ -3,7 +3,7 @@
 //! Conversions are kept until an item's revision changes, so a steady scene costs one table look-up an entity. Parts of
 //! an entity on the GPU: 0 its mesh and its borders, 1 its iso-lines, 2 its cap line.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -112,7 +112,10 @@ impl Stage {
             self.plane = look.section;
             self.planes += 1;
         }
-        self.dressed.retain(|id, _| scene.item(*id).is_some());
+        if self.dressed.len() > scene.items().len() {
+            let there: HashSet<EntityId> = scene.items().iter().map(Item::id).collect();
+            self.dressed.retain(|id, _| there.contains(id));
+        }
         for (at, item) in scene.items().iter().enumerate().filter(|(_, item)| item.visible()) {
             self.add(&mut frame, at, item, look, emphasis(item.id()));
         }

@@ -53,6 +53,7 @@ pub enum Action {
     ShowReport,
     SelectTool,
     PatchTool,
+    AdjustPatch,
     CancelJobs,
     Palette,
     Keys,
@@ -99,6 +100,8 @@ pub struct Info {
     pub group: u8,
     /// Its key.
     pub shortcut: Option<KeyboardShortcut>,
+    /// Whether the key is meant on the numeric pad.
+    pub pad: bool,
     /// Its picture on the toolbar.
     pub icon: Option<Icon>,
     /// One sentence for tooltips and the palette.
@@ -117,11 +120,31 @@ const fn entry(
     shortcut: Option<KeyboardShortcut>,
     help: &'static str,
 ) -> Info {
-    Info { action, name, menu, group, shortcut, icon: None, help }
+    Info { action, name, menu, group, shortcut, pad: false, icon: None, help }
 }
 
 const fn with(icon: Icon, info: Info) -> Info {
     Info { icon: Some(icon), ..info }
+}
+
+/// Its key is on the numeric pad.
+const fn on_pad(info: Info) -> Info {
+    Info { pad: true, ..info }
+}
+
+impl Info {
+    /// Its key for people, empty without one.
+    pub fn keys(&self, ctx: &egui::Context) -> String {
+        match &self.shortcut {
+            None => String::new(),
+            Some(shortcut) if !self.pad => ctx.format_shortcut(shortcut),
+            Some(shortcut) => {
+                let digit = shortcut.logical_key.symbol_or_name();
+                let held = if shortcut.modifiers.command { "Ctrl+" } else { "" };
+                format!("{held}Num {digit}")
+            }
+        }
+    }
 }
 
 const NONE: Modifiers = Modifiers::NONE;
@@ -207,22 +230,22 @@ pub const ACTIONS: &[Info] = &[
             "Fit what is selected into the view",
         ),
     ),
-    entry(Action::Front, View, 1, "Front view", key(NONE, Key::Num1), "Look along +y"),
-    entry(Action::Back, View, 1, "Back view", key(CTRL, Key::Num1), "Look along -y"),
-    entry(Action::Right, View, 1, "Right view", key(NONE, Key::Num3), "Look along -x"),
-    entry(Action::Left, View, 1, "Left view", key(CTRL, Key::Num3), "Look along +x"),
-    entry(Action::Top, View, 1, "Top view", key(NONE, Key::Num7), "Look along -z"),
-    entry(Action::Bottom, View, 1, "Bottom view", key(CTRL, Key::Num7), "Look along +z"),
+    on_pad(entry(Action::Front, View, 1, "Front view", key(NONE, Key::Num1), "Look along +y")),
+    on_pad(entry(Action::Back, View, 1, "Back view", key(CTRL, Key::Num1), "Look along -y")),
+    on_pad(entry(Action::Right, View, 1, "Right view", key(NONE, Key::Num3), "Look along -x")),
+    on_pad(entry(Action::Left, View, 1, "Left view", key(CTRL, Key::Num3), "Look along +x")),
+    on_pad(entry(Action::Top, View, 1, "Top view", key(NONE, Key::Num7), "Look along -z")),
+    on_pad(entry(Action::Bottom, View, 1, "Bottom view", key(CTRL, Key::Num7), "Look along +z")),
     with(
         Icon::Projection,
-        entry(
+        on_pad(entry(
             Action::Perspective,
             View,
             1,
             "Perspective",
             key(NONE, Key::Num5),
             "Switch between perspective and parallel projection",
-        ),
+        )),
     ),
     with(Icon::Shaded, entry(Action::Shaded, View, 2, "Shaded", key(ALT, Key::Num1), "Fill the surfaces")),
     with(
@@ -274,6 +297,14 @@ pub const ACTIONS: &[Info] = &[
             key(NONE, Key::P),
             "Pick four sides and lay a patch over what is broken between them",
         ),
+    ),
+    entry(
+        Action::AdjustPatch,
+        Heal,
+        0,
+        "Adjust patch",
+        key(NONE, Key::E),
+        "Go back to the sides of the selected patch; what is healed then takes its place",
     ),
     entry(
         Action::CancelJobs,
@@ -358,7 +389,7 @@ mod tests {
             assert!(!info.name.contains("..."), "{}", info.name);
             assert!(!info.help.is_empty() && !info.help.ends_with('.'), "{}", info.help);
             if let Some(shortcut) = info.shortcut {
-                assert!(keys.insert(shortcut), "{shortcut:?} twice");
+                assert!(keys.insert((shortcut, info.pad)), "{shortcut:?} twice");
             }
             assert_eq!(super::info(info.action).name, info.name);
         }

@@ -1,10 +1,11 @@
 //! The application: what is laid out where, and what happens each frame.
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use egui::{CentralPanel, Frame, Key, Margin, Modifiers, Panel, Ui};
+use egui::{CentralPanel, Frame, Key, KeyboardShortcut, Margin, Modifiers, Panel, Ui};
 
 use super::actions::{ACTIONS, Action};
 use super::autosave::Autosave;
@@ -12,6 +13,7 @@ use super::dialogs::{Answer, Dialog, Then};
 use super::editor::{Editor, Page};
 use super::files::Files;
 use super::hints::{self, Hints};
+use super::numpad::{Listener, Numpad};
 use super::palette;
 use super::panels::uv::{self, UvView};
 use super::settings::Settings;
@@ -22,6 +24,7 @@ use crate::io::autosave::Journal;
 use crate::model::command::Command;
 use crate::model::history::History;
 use crate::model::selection::Selection;
+use crate::view::pick::Filter;
 use crate::work::Jobs;
 
 /// How the editor starts.
@@ -35,13 +38,16 @@ pub struct Options {
     pub journal: Option<Journal>,
     /// Where positions of buttons and curves are written for scripts.
     pub hints: Option<PathBuf>,
+    /// Who tells the digits of the numeric pad from the others.
+    pub numpad: Numpad,
 }
 
 impl Options {
     /// What a user's session starts with.
     pub fn of_user(files: Vec<PathBuf>) -> Self {
         let hints = std::env::var_os("PATCHWRIGHT_SCRIPT_HINTS").map(PathBuf::from);
-        Self { files, settings: Settings::path(), journal: Journal::of_user(), hints }
+        let numpad = Numpad::default();
+        Self { files, settings: Settings::path(), journal: Journal::of_user(), hints, numpad }
     }
 }
 
@@ -62,8 +68,24 @@ pub fn run(files: Vec<PathBuf>) -> Result<(), String> {
         dithering: false,
         ..eframe::NativeOptions::default()
     };
-    eframe::run_native("Patchwright", native, Box::new(|cc| Ok(Box::new(App::new(cc, options)))))
-        .map_err(|error| format!("no window could be opened: {error}"))
+    let failed = |error: &dyn std::fmt::Display| format!("no window could be opened: {error}");
+    let mut event_loop = winit::event_loop::EventLoop::<eframe::UserEvent>::with_user_event();
+    let event_loop = event_loop.build().map_err(|error| failed(&error))?;
+    let numpad = options.numpad.clone();
+    let opened = Arc::new(AtomicBool::new(false));
+    let note = Arc::clone(&opened);
+    let make: eframe::AppCreator<'_> = Box::new(move |cc| {
+        note.store(true, Ordering::Relaxed);
+        Ok(Box::new(App::new(cc, options)))
+    });
+    let app = eframe::create_native("Patchwright", native, make, &event_loop);
+    event_loop.run_app(&mut Listener { app, numpad }).map_err(|error| failed(&error))?;
+    // eframe logs why and ends its loop; what it came to is not handed on.
+    if opened.load(Ordering::Relaxed) {
+        Ok(())
+    } else {
+        Err(failed(&"no graphics adapter could be used; the log line above says more"))
+    }
 }
 
 /// The application.
@@ -71,6 +93,9 @@ pub struct App {
     /// Everything but the drawing.
     pub editor: Editor,
     hints: Option<Arc<Mutex<hints::State>>>,
+    numpad: Numpad,
+    /// The digits pressed on the numeric pad since the last frame.
+    pad: Vec<(Modifiers, Key)>,
 }
 
 impl App {
@@ -89,6 +114,7 @@ impl App {
             settings_path: options.settings,
             viewport: Viewport::new(cc.wgpu_render_state.as_ref()),
             tool: Tool::Select,
+            pickable: Filter { iso_lines: true, ..Filter::ALL },
             pick_list: None,
             page: Page::Tool,
             dialog: None,
@@ -96,6 +122,7 @@ impl App {
             note: None,
             filter: String::new(),
             checking: None,
+            seams: None,
             may_close: false,
             recoveries: Vec::new(),
             uv: UvView::default(),
@@ -111,13 +138,15 @@ impl App {
         if let Some(journal) = &options.journal {
             editor.offer_recovery(journal.recoverable());
         }
-        Self { editor, hints: options.hints.map(|path| Hints::install(ctx, path)) }
+        let hints = options.hints.map(|path| Hints::install(ctx, path));
+        Self { editor, hints, numpad: options.numpad, pad: Vec::new() }
     }
 
     /// Shortcuts of the active tool first, then those of the actions.
     fn keys(&mut self, ctx: &egui::Context) {
         // An open menu has the keyboard: Esc closes it and nothing else.
         let menu = egui::Popup::is_any_open(ctx);
+        let pad = std::mem::take(&mut self.pad);
         if menu || self.editor.dialog.is_some() || self.editor.palette.is_some() {
             return;
         }
@@ -126,9 +155,14 @@ impl App {
             self.editor.tool_keys(ctx);
         }
         let mut chosen = Vec::new();
+        for (held, digit) in pad {
+            let same = |s: KeyboardShortcut| s.logical_key == digit && same_modifiers(held, s.modifiers);
+            chosen.extend(ACTIONS.iter().filter(|i| i.pad && i.shortcut.is_some_and(same)).map(|i| i.action));
+        }
+        let plain_digits = self.editor.settings.digits_as_pad && matches!(self.editor.tool, Tool::Select);
         ctx.input_mut(|input| {
             for info in ACTIONS {
-                let Some(shortcut) = info.shortcut else { continue };
+                let Some(shortcut) = info.shortcut.filter(|_| !info.pad || plain_digits) else { continue };
                 let function_key = matches!(shortcut.logical_key, Key::F1 | Key::F9 | Key::F10);
                 if typing && !function_key && (shortcut.modifiers.is_none() || shortcut.conflicts_with_text_editing()) {
                     continue;
@@ -200,19 +234,30 @@ pub fn take_key(input: &mut egui::InputState, modifiers: Modifiers, key: Key) ->
     let mut taken = false;
     input.events.retain(|event| {
         let hit = matches!(event, egui::Event::Key { key: k, modifiers: m, pressed: true, .. }
-            if *k == key && m.shift == modifiers.shift && m.alt == modifiers.alt
-                && (m.command || m.ctrl) == (modifiers.command || modifiers.ctrl));
+            if *k == key && same_modifiers(*m, modifiers));
         taken |= hit;
         !hit
     });
     taken
 }
 
+fn same_modifiers(a: Modifiers, b: Modifiers) -> bool {
+    a.shift == b.shift && a.alt == b.alt && (a.command || a.ctrl) == (b.command || b.ctrl)
+}
+
 impl eframe::App for App {
+    fn raw_input_hook(&mut self, ctx: &egui::Context, raw: &mut egui::RawInput) {
+        self.pad.extend(self.numpad.take(&mut raw.events, ctx.text_edit_focused()));
+    }
+
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
         self.editor.poll_files(ctx);
         self.editor.poll_export();
-        self.editor.poll_tool();
+        if self.editor.poll_tool() && !ctx.input(|i| i.focused) {
+            // Whoever went elsewhere meanwhile is told that the heal is done.
+            let attention = egui::UserAttentionType::Informational;
+            ctx.send_viewport_cmd(egui::ViewportCommand::RequestUserAttention(attention));
+        }
         self.editor.poll_autosave();
         if ctx.input(|i| i.viewport().close_requested()) && !self.editor.may_close {
             let dirty = self.editor.history.is_dirty() && !self.editor.document().entities().is_empty();

@@ -31,7 +31,7 @@ pub fn menu(ui: &mut Ui, editor: &mut Editor) {
 
 fn item(ui: &mut Ui, editor: &mut Editor, info: &Info) {
     let enabled = editor.enabled(info.action);
-    let shortcut = info.shortcut.map(|s| ui.ctx().format_shortcut(&s)).unwrap_or_default();
+    let shortcut = info.keys(ui.ctx());
     let on = editor.checked(info.action);
     let button = Button::selectable(on == Some(true), info.name).shortcut_text(shortcut);
     let response = ui.add_enabled(enabled.is_ok(), button).on_hover_text(info.help);
@@ -80,7 +80,7 @@ pub fn toolbar(ui: &mut Ui, editor: &mut Editor) {
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let info = actions::info(Action::Palette);
             let text = egui::RichText::new("Find command").color(theme::of(ui).text[1]);
-            let shortcut = info.shortcut.map(|s| ui.ctx().format_shortcut(&s)).unwrap_or_default();
+            let shortcut = info.keys(ui.ctx());
             let button = Button::new(text).shortcut_text(shortcut).min_size(vec2(190.0, 24.0));
             if ui.add(button).on_hover_text(info.help).clicked() {
                 let ctx = ui.ctx().clone();
@@ -96,7 +96,7 @@ pub fn tool_button(ui: &mut Ui, editor: &mut Editor, action: Action) {
     let Some(icon) = info.icon else { return };
     let enabled = editor.enabled(action);
     let on = editor.checked(action) == Some(true);
-    let keys = info.shortcut.map(|s| format!(" ({})", ui.ctx().format_shortcut(&s))).unwrap_or_default();
+    let keys = info.shortcut.map(|_| format!(" ({})", info.keys(ui.ctx()))).unwrap_or_default();
     let name = info.name.trim_end_matches('…');
     let response = ui.add_enabled_ui(enabled.is_ok(), |ui| icons::button(ui, icon, name, theme::TOOL, on)).inner;
     let help = format!("{name}{keys}\n{}", info.help);

@@ -11,6 +11,7 @@ use super::settings::{Settings, Theme};
 use super::theme;
 use crate::model::document::EntityId;
 use crate::view::navigation::Preset;
+use crate::view::patch_tool::HELP;
 
 /// Something that went wrong: what, why, and what can be done about it.
 #[derive(Clone, Debug, Default)]
@@ -507,6 +508,9 @@ fn settings_dialog(ui: &mut Ui, settings: &mut Settings) -> Answer {
             ui.add(egui::Label::new(RichText::new(settings.navigation.summary()).small()).wrap());
         });
         ui.end_row();
+        ui.label("Digits");
+        ui.checkbox(&mut settings.digits_as_pad, "Plain digits stand for the numeric pad while no tool is on");
+        ui.end_row();
     });
     let closed = buttons(ui, |ui| primary(ui, "Close").clicked());
     if closed {
@@ -518,25 +522,9 @@ fn settings_dialog(ui: &mut Ui, settings: &mut Settings) -> Answer {
     }
 }
 
-/// Keys of the patch tool, in the words of its prompt.
-const TOOL_KEYS: [(&str, &str); 11] = [
-    ("Click", "Add a piece to the side"),
-    ("Enter", "Next side, then heal, then accept"),
-    ("Backspace", "Take the last piece back"),
-    ("1 2 3 4", "Go to a side"),
-    ("X", "Flip the side"),
-    ("T", "Chain tangent pieces on or off"),
-    ("Tab", "The other order of sides"),
-    ("S", "Snapping on or off"),
-    ("V", "Preview on or off"),
-    ("D", "Deviation map on or off"),
-    ("Esc", "Cancel; twice leaves the tool"),
-];
-
 fn keys(ui: &mut Ui, preset: Preset) -> Answer {
     ui.heading("Keys and mouse");
     ui.add_space(6.0);
-    let shortcut = |ui: &Ui, s: &egui::KeyboardShortcut| ui.ctx().format_shortcut(s);
     ScrollArea::vertical().max_height(460.0).auto_shrink([false, true]).show(ui, |ui| {
         ui.columns(2, |columns| {
             let (left, right) = columns.split_at_mut(1);
@@ -553,8 +541,8 @@ fn keys(ui: &mut Ui, preset: Preset) -> Answer {
                 column.strong(menu.title());
                 egui::Grid::new(menu.title()).num_columns(2).spacing(vec2(14.0, 3.0)).show(column, |ui| {
                     for info in ACTIONS.iter().filter(|i| i.menu == menu) {
-                        if let Some(s) = &info.shortcut {
-                            ui.monospace(shortcut(ui, s));
+                        if info.shortcut.is_some() {
+                            ui.monospace(info.keys(ui.ctx()));
                             ui.label(info.name);
                             ui.end_row();
                         }
@@ -564,9 +552,9 @@ fn keys(ui: &mut Ui, preset: Preset) -> Answer {
             right.add_space(8.0);
             right.strong("While picking a patch");
             egui::Grid::new("tool keys").num_columns(2).spacing(vec2(14.0, 3.0)).show(right, |ui| {
-                for (key, what) in TOOL_KEYS {
-                    ui.monospace(key);
-                    ui.label(what);
+                for line in HELP {
+                    ui.monospace(line.key);
+                    ui.add(egui::Label::new(line.what).wrap());
                     ui.end_row();
                 }
             });

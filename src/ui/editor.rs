@@ -14,11 +14,14 @@ use super::settings::{Settings, Theme};
 use super::tools::{PickList, Tool};
 use super::viewport::Viewport;
 use crate::io::autosave::Recovery;
+use crate::model::borders;
 use crate::model::command::Command;
-use crate::model::document::{Document, EntityId};
+use crate::model::document::{Document, EntityId, Shape};
 use crate::model::history::History;
 use crate::model::selection::Selection;
 use crate::view::camera::{Axis, Projection};
+use crate::view::pick::Filter;
+use crate::view::visibility::{self, VisibilityKey};
 use crate::work::Jobs;
 
 /// The pages of the right panel.
@@ -77,6 +80,8 @@ pub struct Editor {
     pub viewport: Viewport,
     /// The active tool.
     pub tool: Tool,
+    /// What the user lets a click pick, of what the tool can.
+    pub pickable: Filter,
     /// The list of everything under the cursor, when it is open.
     pub pick_list: Option<PickList>,
     /// The page of the right panel.
@@ -91,6 +96,8 @@ pub struct Editor {
     pub filter: String,
     /// A patch passes when its largest error is within this; by the model's size when not set.
     pub checking: Option<f64>,
+    /// How far patches are from those next to them, for one revision of the document.
+    pub seams: Option<(u64, Vec<(EntityId, Option<f64>)>)>,
     /// What crashed sessions left behind.
     pub recoveries: Vec<Recovery>,
     /// Puts changes aside.
@@ -166,11 +173,20 @@ impl Editor {
                 "there is no surface, patch, mesh or block",
             ),
             Action::SaveSpec => need(self.document().patches().next().is_some(), "there are no patches yet"),
-            Action::Delete | Action::Hide | Action::Isolate | Action::Deselect => need(selected, "nothing is selected"),
+            Action::Delete | Action::Deselect => need(selected, "nothing is selected"),
             Action::Rename => need(self.selection.ids().len() == 1, "select one entity"),
             Action::SelectAll => need(self.document().entities().iter().any(|e| e.visible), "nothing is visible"),
-            Action::ShowAll => need(self.document().entities().iter().any(|e| !e.visible), "everything is visible"),
+            Action::Hide => self.visibility(VisibilityKey::Hide).map(|_| ()),
+            Action::Isolate => self.visibility(VisibilityKey::Isolate).map(|_| ()),
+            Action::ShowAll => self.visibility(VisibilityKey::ShowAll).map(|_| ()),
             Action::PatchTool => need(self.document().bodies().next().is_some(), "there is nothing to heal"),
+            Action::AdjustPatch => {
+                let one = match self.selection.ids() {
+                    [id] => self.document().get(*id),
+                    _ => None,
+                };
+                need(one.is_some_and(|e| matches!(e.shape, Shape::Patch(_))), "select one healed patch")
+            }
             Action::FrameAll => need(!self.document().entities().is_empty(), "the model is empty"),
             Action::FrameSelection => need(selected, "nothing is selected"),
             Action::CancelJobs => need(!self.jobs.active().is_empty(), "nothing is running"),
@@ -247,17 +263,15 @@ impl Editor {
             }
             Action::Settings => self.dialog = Some(Dialog::Settings),
             Action::Hide => {
-                let ids = ids();
-                if self.command(&Command::SetVisible { ids, visible: false }) {
+                if self.change_visibility(VisibilityKey::Hide) {
                     self.selection.clear();
                 }
             }
             Action::Isolate => {
-                let ids = ids();
-                self.command(&Command::Isolate { ids });
+                self.change_visibility(VisibilityKey::Isolate);
             }
             Action::ShowAll => {
-                self.command(&Command::ShowAll);
+                self.change_visibility(VisibilityKey::ShowAll);
             }
             Action::FrameAll => self.viewport.frame(&visible_bounds(self.history.document())),
             Action::FrameSelection => {
@@ -314,6 +328,7 @@ impl Editor {
             Action::ShowReport => self.show_page(Page::Report),
             Action::SelectTool => self.leave_tool(),
             Action::PatchTool => self.start_patch(),
+            Action::AdjustPatch => self.adjust_patch(),
             Action::CancelJobs => {
                 self.jobs.cancel_all();
                 self.say("Asked every job to stop");
@@ -322,6 +337,25 @@ impl Editor {
             Action::Keys => self.dialog = Some(Dialog::Keys),
             Action::About => self.dialog = Some(Dialog::About),
         }
+    }
+
+    /// The command of a key of the visibility group, or why there is nothing to do.
+    fn visibility(&self, key: VisibilityKey) -> Result<Command, &'static str> {
+        visibility::command(key, self.document(), &self.selection, self.viewport.hovered_entity())
+    }
+
+    fn change_visibility(&mut self, key: VisibilityKey) -> bool {
+        self.visibility(key).is_ok_and(|command| self.command(&command))
+    }
+
+    /// How far each patch is from the patches next to it.
+    pub fn seam_gaps(&mut self) -> Vec<(EntityId, Option<f64>)> {
+        let revision = self.history.revision();
+        if self.seams.as_ref().is_none_or(|(of, _)| *of != revision) {
+            let document = self.document();
+            self.seams = Some((revision, borders::seam_gaps(document, document.tolerances().joining)));
+        }
+        self.seams.as_ref().map_or(Vec::new(), |(_, gaps)| gaps.clone())
     }
 
     /// The tolerance that patches are checked with, in model units.

@@ -8,7 +8,7 @@ use super::editor::{Editor, Page};
 use crate::io::{self, ImportReport, SaveOptions, Saved};
 use crate::model::document::Document;
 use crate::model::history::History;
-use crate::model::spec::{HealSpec, PatchSpec};
+use crate::model::replay::spec_of;
 use crate::work::{Lane, Outcome, Ticket};
 
 /// What reading some files came to.
@@ -175,6 +175,7 @@ impl Editor {
         self.files.title = title;
         self.files.report = report;
         self.history = History::new(document, saved);
+        self.seams = None;
         self.files.target = None;
         self.viewport.new_document(self.history.document());
     }
@@ -194,7 +195,8 @@ impl Editor {
                     self.files.target = Some(written.path);
                 }
                 if saved.notes.is_empty() {
-                    self.say(format!("Saved {name}: {} entities", saved.entities));
+                    let what = if written.what == SaveWhat::Spec { "patches" } else { "entities" };
+                    self.say(format!("Saved {name}: {} {what}", saved.entities));
                 } else {
                     self.warn(format!("Saved {name}: {}", saved.notes.join("; ")));
                 }
@@ -259,24 +261,10 @@ fn read(paths: &[PathBuf], job: &crate::kernel::job::Job) -> Result<(Document, I
     all.ok_or_else(|| "no file was named".to_owned())
 }
 
-/// The specification that heals every patch of the document again.
-pub fn spec_of(document: &Document) -> HealSpec {
-    let patches: Vec<PatchSpec> = document.patches().map(|(_, patch)| patch.spec.clone()).collect();
-    HealSpec { joining_tol: None, tol: None, max_resolution: 128, onto: None, slab: None, neighbours: 8, patches }
-}
-
 fn write_spec(path: &Path, document: &Document) -> Result<Saved, String> {
-    let spec = spec_of(document);
-    let text = ron::ser::to_string_pretty(&spec, ron::ser::PrettyConfig::default()).map_err(|e| e.to_string())?;
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let write = || -> std::io::Result<()> {
-        let mut file = tempfile::NamedTempFile::new_in(folder)?;
-        std::io::Write::write_all(&mut file, text.as_bytes())?;
-        file.persist(path)?;
-        Ok(())
-    };
-    write().map_err(|e| format!("cannot write {}: {e}", path.display()))?;
-    Ok(Saved { entities: spec.patches.len(), ..Saved::default() })
+    let spec = spec_of(document).ok_or("there are no patches to write a specification of")?;
+    io::save_spec(path, &spec).map_err(|e| e.to_string())?;
+    Ok(Saved { entities: document.patches().count(), ..Saved::default() })
 }
 
 /// The bundled examples: names and what each shows.

@@ -12,6 +12,7 @@ mod files;
 mod hints;
 mod icons;
 mod linked;
+mod numpad;
 pub mod paint;
 mod palette;
 mod panels;
@@ -21,4 +22,8 @@ mod theme;
 mod tools;
 mod viewport;
 
+pub use actions::Action;
 pub use app::{App, Options, run};
+pub use editor::Page;
+pub use numpad::Numpad;
+pub use tools::Tool;

@@ -69,7 +69,7 @@ impl Palette {
                     }
                     for (at, info) in found.iter().enumerate() {
                         let why_not = enabled(info.action).err();
-                        let shortcut = info.shortcut.map(|s| ui.ctx().format_shortcut(&s)).unwrap_or_default();
+                        let shortcut = info.keys(ui.ctx());
                         let text =
                             egui::RichText::new(info.name).color(if why_not.is_some() { t.text[1] } else { t.text[0] });
                         let button = egui::Button::selectable(at == self.chosen, text)

@@ -28,6 +28,9 @@ pub struct Settings {
     pub theme: Theme,
     /// Which mouse buttons navigate.
     pub navigation: Preset,
+    /// Whether the digits of the main row do what those of the numeric pad do, while no tool wants them: for keyboards
+    /// without a pad.
+    pub digits_as_pad: bool,
     /// The files opened last, newest first.
     pub recent: Vec<PathBuf>,
     /// Whether the left panel is shown.
@@ -43,6 +46,7 @@ impl Default for Settings {
         Self {
             theme: Theme::default(),
             navigation: Preset::default(),
+            digits_as_pad: false,
             recent: Vec::new(),
             left_panel: true,
             right_panel: true,

@@ -70,6 +70,19 @@ impl Filter {
         }
     }
 
+    /// What both allow.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            points: self.points && other.points,
+            free_curves: self.free_curves && other.free_curves,
+            borders: self.borders && other.borders,
+            iso_lines: self.iso_lines && other.iso_lines,
+            surfaces: self.surfaces && other.surfaces,
+            patches: self.patches && other.patches,
+        }
+    }
+
     fn curve(&self, curve: &CurveRef) -> bool {
         match curve {
             CurveRef::Free(_) => self.free_curves,
@@ -171,8 +184,7 @@ pub fn pick(scene: &Scene, view: &View, pixel: DVec2, options: &PickOptions) -> 
     let mut pyramid = Pyramid::new(view, pixel, RADIUS, options.section.as_ref());
     for radius in [RADIUS, WIDE_RADIUS] {
         pyramid.set_radius(radius);
-        let found =
-            best_point(scene, view, pixel, radius, options).or_else(|| best_curve(scene, &mut pyramid, options));
+        let found = best_point(scene, &pyramid, options).or_else(|| best_curve(scene, &mut pyramid, options));
         if found.is_some() {
             return found;
         }
@@ -199,8 +211,9 @@ pub fn pick_all(scene: &Scene, view: &View, pixel: DVec2, options: &PickOptions)
             break;
         }
     }
+    let cover = Cover::new(scene, &Pyramid::new(view, pixel, WIDE_RADIUS, options.section.as_ref()), options);
     for hit in &mut hits {
-        hit.hidden = options.occlusion && is_hidden(scene, view, hit.point, options);
+        hit.hidden = cover.hides(hit.point);
     }
     let ray = view.ray(pixel);
     let mut in_front = false;
@@ -251,28 +264,31 @@ fn point_hit(view: &View, pixel: DVec2, radius: f64, options: &PickOptions, k: u
     })
 }
 
-fn best_point(scene: &Scene, view: &View, pixel: DVec2, radius: f64, options: &PickOptions) -> Option<PickHit> {
-    if !options.filter.points {
+fn best_point(scene: &Scene, pyramid: &Pyramid, options: &PickOptions) -> Option<PickHit> {
+    if !options.filter.points || options.points.is_empty() {
         return None;
     }
+    let (view, pixel, radius) = (pyramid.view(), pyramid.pixel(), pyramid.radius());
     let mut hits: Vec<PickHit> =
         (0..options.points.len()).filter_map(|k| point_hit(view, pixel, radius, options, k)).collect();
     in_order(&mut hits);
-    hits.into_iter().find(|hit| !options.occlusion || !is_hidden(scene, view, hit.point, options))
+    let cover = Cover::new(scene, pyramid, options);
+    hits.into_iter().find(|hit| !cover.hides(hit.point))
 }
 
 fn best_curve(scene: &Scene, pyramid: &mut Pyramid, options: &PickOptions) -> Option<PickHit> {
     let hits = curve_candidates(scene, pyramid, options, CANDIDATES);
-    let view = pyramid.view();
+    if hits.is_empty() {
+        return None;
+    }
+    let cover = Cover::new(scene, pyramid, options);
     // The nearest that is seen, and then its equals by depth: nothing is asked of the surfaces twice.
-    let first = hits.iter().position(|h| !options.occlusion || !is_hidden(scene, view, h.point, options))?;
+    let first = hits.iter().position(|h| !cover.hides(h.point))?;
     let limit = hits[first].distance + EQUAL;
     let mut equals: Vec<&PickHit> = hits[first..].iter().take_while(|h| h.distance <= limit).collect();
     equals.sort_by(|a, b| a.depth.total_cmp(&b.depth));
-    let best = equals
-        .into_iter()
-        .find(|h| h.depth >= hits[first].depth || !options.occlusion || !is_hidden(scene, view, h.point, options));
-    best.copied().map(|hit| polished(scene, view, hit))
+    let best = equals.into_iter().find(|h| h.depth >= hits[first].depth || !cover.hides(h.point));
+    best.copied().map(|hit| polished(scene, pyramid.view(), hit))
 }
 
 /// The nearest place of each of the `limit` nearest curves within the pyramid, nearest in pixels first.
@@ -333,22 +349,39 @@ fn in_order(hits: &mut [PickHit]) {
     hits.sort_by(|a, b| a.distance.total_cmp(&b.distance).then(a.depth.total_cmp(&b.depth)));
 }
 
-/// Whether a surface is in front of a point by more than the triangles may err there.
-pub fn is_hidden(scene: &Scene, view: &View, point: DVec3, options: &PickOptions) -> bool {
-    let Some(at) = view.project(point) else { return true };
-    let ray = view.ray(at.pixel);
-    let slack = 3.0 * view.pixel_size_at(at.depth.max(view.near));
-    let reach = (point - ray.origin).dot(ray.direction) - slack;
-    let Some([from, to]) = range(&ray, options) else { return false };
-    let to = to.min(reach);
-    scene.items().iter().filter(|item| item.visible() && item.kind != ItemKind::Curve).any(|item| {
-        item.display.as_ref().is_some_and(|d| {
-            d.tree.first_hit(ray.at(from), ray.direction, to - from).is_some_and(|hit| {
-                // A coarse triangle in front of its own border is no cover.
-                from + hit.t < reach - 2.0 * d.chord_tol
-            })
+/// The surfaces that may be in front of something near a pixel: asked once, and then for every candidate there.
+pub(super) struct Cover<'a> {
+    items: Vec<&'a Item>,
+    view: &'a View,
+    options: PickOptions<'a>,
+}
+
+impl<'a> Cover<'a> {
+    /// Those that a pyramid meets.
+    pub(super) fn new(scene: &'a Scene, pyramid: &Pyramid<'a>, options: &PickOptions<'a>) -> Self {
+        let meets = |item: &&Item| {
+            options.occlusion && item.visible() && item.kind != ItemKind::Curve && pyramid.meets_box(&item.bounds)
+        };
+        Self { items: scene.items().iter().filter(meets).collect(), view: pyramid.view(), options: *options }
+    }
+
+    /// Whether one of them is in front of a point near the pixel by more than the triangles may err there. Without occlusion
+    /// nothing is hidden.
+    pub(super) fn hides(&self, point: DVec3) -> bool {
+        if !self.options.occlusion {
+            return false;
+        }
+        let Some(at) = self.view.project(point) else { return true };
+        let ray = self.view.ray(at.pixel);
+        let slack = 3.0 * self.view.pixel_size_at(at.depth.max(self.view.near));
+        let reach = (point - ray.origin).dot(ray.direction) - slack;
+        let Some([from, to]) = range(&ray, &self.options) else { return false };
+        let start = ray.at(from);
+        self.items.iter().filter_map(|item| item.display.as_ref()).any(|d| {
+            // A coarse triangle in front of its own border is no cover.
+            d.tree.is_hit(start, ray.direction, to.min(reach - 2.0 * d.chord_tol) - from)
         })
-    })
+    }
 }
 
 /// The part of a ray that is not cut away.
@@ -639,7 +672,8 @@ mod tests {
         let cut = SectionPlane::new(DVec3::new(0.0, 0.0, -0.25), DVec3::Z);
         let hit = pick(&scene, &view, at, &PickOptions { section: cut, ..options }).unwrap();
         assert!(matches!(hit.target, Target::Curve { .. }));
-        assert!(is_hidden(&scene, &view, DVec3::new(0.5, 0.3, -0.5), &options));
+        let cover = Cover::new(&scene, &Pyramid::new(&view, at, RADIUS, None), &options);
+        assert!(cover.hides(DVec3::new(0.5, 0.3, -0.5)) && !cover.hides(DVec3::new(0.5, 0.3, 0.5)));
         let cut = SectionPlane::new(DVec3::new(0.0, 0.0, -2.0), DVec3::Z);
         assert!(pick(&scene, &view, at, &PickOptions { section: cut, ..options }).is_none());
     }

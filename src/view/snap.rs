@@ -8,7 +8,7 @@
 use glam::{DVec2, DVec3};
 
 use super::display::CurveRef;
-use super::pick::{PickHit, PickOptions, RADIUS, Target, curve_candidates, is_hidden};
+use super::pick::{Cover, PickHit, PickOptions, RADIUS, Target, curve_candidates};
 use super::scene::Scene;
 use super::segment_tree::Pyramid;
 use super::viewport::View;
@@ -141,7 +141,8 @@ pub fn snap(
         }
     }
     found.sort_by(|a, b| a.kind.cmp(&b.kind).then(a.distance.total_cmp(&b.distance)));
-    found.into_iter().find(|s| !pick.occlusion || !is_hidden(scene, view, s.point, pick))
+    let cover = Cover::new(scene, &pyramid, pick);
+    found.into_iter().find(|s| !cover.hides(s.point))
 }
 
 type Corner = (DVec3, Vec<(CurveRef, f64)>, f64);

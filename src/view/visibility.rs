@@ -30,20 +30,20 @@ pub fn command(
     }
     let is_visible = |id: &EntityId| document.get(*id).is_some_and(|e| e.visible);
     match key {
-        VisibilityKey::ShowAll if document.entities().iter().all(|e| e.visible) => Err("Everything is shown already"),
+        VisibilityKey::ShowAll if document.entities().iter().all(|e| e.visible) => Err("everything is shown already"),
         VisibilityKey::ShowAll => Ok(Command::ShowAll),
-        _ if ids.is_empty() => Err("Nothing is selected; click a thing first"),
+        _ if ids.is_empty() => Err("nothing is selected; click a thing first"),
         VisibilityKey::Hide => {
             ids.retain(is_visible);
             if ids.is_empty() {
-                return Err("The selection is hidden already; Alt+H shows everything");
+                return Err("the selection is hidden already; Alt+H shows everything");
             }
             Ok(Command::SetVisible { ids, visible: false })
         }
         VisibilityKey::Isolate => {
             let alone = document.entities().iter().all(|e| e.visible == ids.contains(&e.id));
             if alone {
-                Err("The selection is alone already; Alt+H shows everything")
+                Err("the selection is alone already; Alt+H shows everything")
             } else {
                 Ok(Command::Isolate { ids })
             }

@@ -220,6 +220,12 @@ pub fn heal_onto(
     refine::run(patches, &refine::plan(patches, options)?, set, options, job)
 }
 
+/// Whether two patches have a boundary curve in common, so that they must be healed together to agree along it. An error
+/// where they break the rules of HJR99 3.7, or where one of them makes no loop.
+pub fn share_boundary(a: &PatchInput, b: &PatchInput, options: &HealOptions) -> Result<bool, HealError> {
+    Ok(refine::plan(&[a.clone(), b.clone()], options)?.shares_an_edge())
+}
+
 impl HealOptions {
     fn check(&self) -> Result<(), HealError> {
         let option =
@@ -235,6 +241,12 @@ impl HealOptions {
         }
         if !(1..=64).contains(&self.hardy.neighbours) {
             return option("neighbours", &self.hardy.neighbours, "1 to 64");
+        }
+        if !(self.hardy.gamma > 0.0 && self.hardy.gamma.is_finite()) {
+            return option("gamma", &self.hardy.gamma, "a positive number");
+        }
+        if let Some(r) = self.hardy.r.filter(|r| !(*r > 0.0 && r.is_finite())) {
+            return option("radius", &r, "a positive number");
         }
         if !(1..=4096).contains(&self.max_resolution) {
             return option("max_resolution", &self.max_resolution, "1 to 4096");

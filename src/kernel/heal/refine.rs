@@ -71,6 +71,11 @@ pub(super) fn plan(patches: &[PatchInput], options: &HealOptions) -> Result<Plan
 }
 
 impl Plan {
+    /// Whether two different patches have an edge in common.
+    pub(super) fn shares_an_edge(&self) -> bool {
+        self.topology.edges.iter().any(|e| e.uses.iter().any(|u| u.patch != e.uses[0].patch))
+    }
+
     /// The boxes of influence of the patches, from a coarse Coons grid (grown by a tenth of the slab for what the
     /// finer ones may add).
     pub(super) fn boxes(&self, options: &HealOptions) -> Vec<Aabb> {
@@ -161,7 +166,8 @@ pub(super) fn run(
     if complete {
         job.progress(1.0);
     }
-    let patches = last.map_or(Vec::new(), |s| s.patches);
+    let mut patches = last.map_or(Vec::new(), |s| s.patches);
+    patches.iter_mut().for_each(|p| p.report.incomplete = !complete);
     let shared = shared_boundaries(topology, &patches);
     Ok(Healed { patches, shared, loops: plan.loops.clone(), complete })
 }

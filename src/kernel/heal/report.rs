@@ -42,6 +42,9 @@ pub struct PatchReport {
     pub history: Vec<HealStep>,
     /// Whether the wanted error was reached.
     pub reached: bool,
+    /// Whether the heal was cancelled: the patch is that of the last resolution that was finished.
+    #[serde(default)]
+    pub incomplete: bool,
 }
 
 /// One iteration of the refinement.

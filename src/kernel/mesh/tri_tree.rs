@@ -162,6 +162,16 @@ impl TriTree {
         best
     }
 
+    /// Whether anything is hit with `0 <= t <= t_max`: cheaper than the first hit.
+    pub fn is_hit(&self, origin: DVec3, direction: DVec3, t_max: f64) -> bool {
+        let mut hit = false;
+        self.visit(origin, direction, [0.0, t_max], |_| {
+            hit = true;
+            f64::NEG_INFINITY
+        });
+        hit
+    }
+
     /// All hits of the segment from `a` (t = 0) to `b` (t = 1), by increasing t, ties by triangle number. A
     /// segment through a shared edge reports every triangle at it.
     pub fn segment_hits(&self, a: DVec3, b: DVec3, hits: &mut Vec<Hit>) {

@@ -94,11 +94,9 @@ impl Builder {
         let spec = HealSpec {
             joining_tol: Some(settings.joining_tol),
             tol: Some(settings.tol),
-            max_resolution: 128,
-            onto: None,
             slab: settings.slab,
-            neighbours: 8,
             patches,
+            ..HealSpec::default()
         };
         Example { name, about, document: self.document, spec }
     }

@@ -14,6 +14,7 @@ use crate::view::patch_tool::{Event, Stage};
 use crate::view::pick::{Filter, PickHit, Target};
 use crate::view::uv::UvPicture;
 
+mod filter_bar;
 mod legend;
 mod patch;
 mod patch_overlay;
@@ -107,8 +108,8 @@ impl Editor {
     /// What the active tool lets one pick, the points that it offers, and a number that changes with them.
     pub fn tool_filter(&self) -> (Filter, Vec<DVec3>, u64) {
         match &self.tool {
-            Tool::Select => (Filter::ALL, Vec::new(), 0),
-            Tool::Patch(session) => (session.tool.filter(), Vec::new(), session.revision),
+            Tool::Select => (Filter::ALL.and(self.pickable), Vec::new(), 0),
+            Tool::Patch(session) => (session.tool.filter().and(self.pickable), Vec::new(), session.revision),
         }
     }
 
@@ -157,6 +158,7 @@ impl Editor {
         if let Tool::Patch(_) = self.tool {
             self.patch_labels(ui, pointer);
         }
+        self.filter_bar(ui);
         self.show_pick_list(ui);
     }
 
@@ -207,7 +209,7 @@ impl Editor {
         if !matches!(session.tool.stage(), Stage::Side(_)) || self.viewport.is_moving() {
             return Vec::new();
         }
-        let filter = session.tool.filter();
+        let filter = session.tool.filter().and(self.pickable);
         let view = self.viewport.view();
         let mut out = Vec::new();
         for item in self.viewport.scene.items().iter().filter(|item| item.visible()) {

@@ -2,10 +2,11 @@
 //! effects become jobs and commands.
 
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use glam::{DVec2, DVec3};
 
-use super::super::editor::{Editor, Page};
+use super::super::editor::{Editor, Note, Page};
 use super::super::viewport::Pointer;
 use super::Tool;
 use crate::kernel::heal::preview::{Preview, PreviewOptions, preview};
@@ -15,11 +16,12 @@ use crate::kernel::mesh::body::Body;
 use crate::kernel::mesh::surface_set::SurfaceSet;
 use crate::kernel::mesh::tessellate::{SurfaceMesh, tessellate_on};
 use crate::model::command::Command;
-use crate::model::document::{Document, EntityId, Patch};
-use crate::model::healing;
+use crate::model::document::{Document, EntityId, Patch, Shape};
+use crate::model::healing::{self, Joined};
 use crate::model::resolve::resolve;
 use crate::model::spec::HealSpec;
 use crate::view::deviation::{Deviation, deviation};
+use crate::view::feature_edges::{EdgeOptions, Edges, feature_edges};
 use crate::view::legend::LegendRange;
 use crate::view::patch_tool::{Effect, Event, Key, PatchTool, Stage};
 use crate::view::pick::PickHit;
@@ -33,12 +35,18 @@ const LINES: [usize; 3] = [4, 32, 128];
 const FAR: f64 = 0.05;
 /// Distances below this fraction of the diagonal are rounding.
 const NOISE: f64 = 1e-10;
+/// How long a heal may take before it stops with what it has.
+const BUDGET: Duration = Duration::from_secs(60);
 
 /// A healed patch with what the window shows of it.
 #[derive(Debug)]
 pub struct Shown {
     /// The patch.
     pub patch: Arc<Patch>,
+    /// Patches of the document that were healed anew with it, because they share boundaries with it or with each other.
+    pub neighbours: Vec<(EntityId, Arc<Patch>)>,
+    /// The boundaries that it shares: with which patch, how far the two are apart, and the largest angle in degrees.
+    pub seams: Vec<(String, f64, f64)>,
     /// The triangles of the deviation map.
     pub mesh: SurfaceMesh,
     /// The deviation at each of its vertices.
@@ -62,8 +70,16 @@ pub struct PatchSession {
     pub sketch: Latest<Option<Preview>>,
     /// The heal that runs.
     pub healing: Option<Ticket<Result<Shown, String>>>,
+    /// When the heal's time is used up; none when the user wants it to go on.
+    deadline: Option<Instant>,
+    /// Whether the last heal stopped because its time was used up.
+    timed_out: bool,
+    /// The heal that was cancelled and has not ended yet.
+    stopping: Option<Ticket<Result<Shown, String>>>,
     /// The patch to be judged.
     pub shown: Option<Shown>,
+    /// The patch of the document that is being adjusted: the result takes its place.
+    pub adjusting: Option<EntityId>,
     /// The ends of the deviation scale.
     pub range: LegendRange,
     /// Shows the box of influence.
@@ -78,6 +94,8 @@ pub struct PatchSession {
     pub trimming: Option<(usize, usize, usize)>,
     /// What is under the cursor, for highlighting.
     pub hover: Option<PickHit>,
+    /// The edges of the model, while they are looked for and after.
+    edges: Latest<Arc<Edges>>,
     originals: Originals,
 }
 
@@ -87,7 +105,11 @@ impl PatchSession {
             tool: PatchTool::new(&document.tolerances(), document.unit),
             sketch: Latest::default(),
             healing: None,
+            deadline: None,
+            timed_out: false,
+            stopping: None,
             shown: None,
+            adjusting: None,
             range: LegendRange { low: -1.0, high: 1.0, locked: false },
             show_slab: false,
             snaps: [true; 5],
@@ -95,8 +117,14 @@ impl PatchSession {
             snap: None,
             trimming: None,
             hover: None,
+            edges: Latest::default(),
             originals: Originals::default(),
         }
+    }
+
+    /// The edges of the model, once they are known.
+    pub fn edges(&self) -> Option<&Edges> {
+        self.edges.value().map(Arc::as_ref)
     }
 
     /// How to snap.
@@ -137,10 +165,30 @@ impl Editor {
         options.name = format!("Patch {}", count + 1);
         session.tool.handle(Event::Start, &self.viewport.scene);
         session.tool.handle(Event::Options(Box::new(options)), &self.viewport.scene);
+        let document = self.history.document().clone();
+        let look = EdgeOptions::new(session.tool.options().joining_tol);
+        session
+            .edges
+            .request(&mut self.jobs, "Find the edges", "", move |job| Arc::new(feature_edges(&document, &look, job)));
         self.selection.clear();
         self.tool = Tool::Patch(Box::new(session));
         self.show_page(Page::Tool);
         self.note = None;
+    }
+
+    /// Goes back to the sides of the selected patch; what is healed then takes its place.
+    pub fn adjust_patch(&mut self) {
+        let selected = self.selection.ids().first().copied();
+        let Some((id, Shape::Patch(patch))) =
+            selected.and_then(|id| Some((id, self.document().get(id)?.shape.clone())))
+        else {
+            return;
+        };
+        self.leave_tool();
+        self.start_patch();
+        let Tool::Patch(session) = &mut self.tool else { return };
+        session.adjusting = Some(id);
+        self.patch_event(Event::StartWith(Box::new(patch.spec.clone()), Box::new(patch.settings.clone())));
     }
 
     /// Hands the tool an event and does what it asks for.
@@ -166,58 +214,92 @@ impl Editor {
             Effect::Run(spec) => {
                 let document = self.history.document().clone();
                 let originals = Arc::clone(&session.originals);
+                let replacing = session.adjusting;
+                let input = written(&spec);
                 let name = format!("Heal {}", spec.patches.first().map_or("patch", |p| p.name.as_str()));
-                session.healing = Some(
-                    self.jobs
-                        .spawn(Lane::Heavy, name, written(&spec), move |job| heal(&document, &spec, &originals, job)),
-                );
+                let work = move |job: &Job| heal(&document, &spec, replacing, &originals, job);
+                session.stopping = None;
+                session.shown = None;
+                // After a heal that took too long the next one may take as long as it likes.
+                session.deadline = (!session.timed_out).then(|| Instant::now() + BUDGET);
+                session.timed_out = false;
+                session.healing = Some(self.jobs.spawn(Lane::Heavy, name, input, work));
             }
             Effect::Cancel => {
-                if let Some(ticket) = session.healing.take() {
+                session.stopping = session.healing.take();
+                if let Some(ticket) = &session.stopping {
                     ticket.cancel();
                 }
             }
-            Effect::Accept { name, patch } => {
-                session.shown = None;
-                let patches = vec![(name.clone(), (*patch).clone())];
-                if self.command(&Command::AddPatches { patches }) {
-                    self.say(format!("{name} added; pick its neighbour, or leave with Esc"));
-                }
-            }
+            Effect::Accept { name, patch } => self.accept_patch(name, &patch),
             Effect::Leave => self.leave_tool(),
         }
     }
 
-    /// Takes over what the tool's workers have made.
-    pub fn poll_tool(&mut self) {
-        let Tool::Patch(session) = &mut self.tool else { return };
+    /// Takes over what the tool's workers have made. True when a heal has ended.
+    pub fn poll_tool(&mut self) -> bool {
+        let Tool::Patch(session) = &mut self.tool else { return false };
         if session.sketch.poll() {
             session.revision += 1;
         }
-        let Some(outcome) = session.healing.as_ref().and_then(Ticket::poll) else { return };
-        session.healing = None;
+        if session.edges.poll()
+            && let Some(edges) = session.edges.value()
+        {
+            session.tool.set_edges(Arc::clone(edges));
+            session.revision += 1;
+        }
+        if let Some(ticket) = &session.healing
+            && session.deadline.is_some_and(|at| Instant::now() >= at)
+        {
+            ticket.cancel();
+            (session.deadline, session.timed_out) = (None, true);
+            let text = format!("The heal used up its {} s; Enter goes on without a limit", BUDGET.as_secs());
+            self.note = Some(Note { text, warning: true, since: Instant::now() });
+        }
+        let slot = if session.healing.is_some() { &mut session.healing } else { &mut session.stopping };
+        let Some(outcome) = slot.as_ref().and_then(Ticket::poll) else { return false };
+        *slot = None;
         session.revision += 1;
         let event = match outcome {
-            Outcome::Finished { value: Ok(shown), .. } => {
+            Outcome::Finished { value: Ok(shown), cancelled } => {
                 session.range = session.range.updated(fitting(&shown, session.tool.options().tol));
                 let patch = Arc::clone(&shown.patch);
                 session.shown = Some(shown);
-                Event::Finished(Ok(patch))
+                if cancelled { Event::Cancelled(Some(patch)) } else { Event::Finished(Ok(patch)) }
             }
-            Outcome::Finished { cancelled: true, .. } | Outcome::NeverRan => Event::Cancelled,
+            Outcome::Finished { cancelled: true, .. } | Outcome::NeverRan => Event::Cancelled(None),
             Outcome::Finished { value: Err(why), .. } => Event::Finished(Err(why)),
             Outcome::Panicked { message, input } => {
                 self.died("Healing the patch", &message, input);
-                Event::Cancelled
+                Event::Cancelled(None)
             }
         };
         self.patch_event(event);
+        true
+    }
+
+    fn accept_patch(&mut self, name: String, patch: &Arc<Patch>) {
+        let Tool::Patch(session) = &mut self.tool else { return };
+        let mut replaced = session.shown.take().map(|shown| shown.neighbours).unwrap_or_default();
+        let (added, text) = match session.adjusting.take() {
+            Some(id) => {
+                replaced.insert(0, (id, Arc::clone(patch)));
+                (Vec::new(), format!("{name} adjusted; pick its neighbour, or leave with Esc"))
+            }
+            None => {
+                let text = format!("{name} added; pick its neighbour, or leave with Esc");
+                (vec![(name, (**patch).clone())], text)
+            }
+        };
+        if self.command(&Command::Heal { added, replaced }) {
+            self.say(text);
+        }
     }
 
     /// Keys of the patch tool.
     pub fn patch_keys(&mut self, ctx: &egui::Context) {
         use egui::{Key as K, Modifiers};
-        const KEYS: [(K, Key); 18] = [
+        const KEYS: [(K, Key); 19] = [
             (K::Enter, Key::Enter),
             (K::Backspace, Key::Backspace),
             (K::Escape, Key::Escape),
@@ -234,6 +316,7 @@ impl Editor {
             (K::C, Key::Trim),
             (K::V, Key::Preview),
             (K::D, Key::Deviation),
+            (K::K, Key::Keep),
             (K::Questionmark, Key::Help),
             (K::Slash, Key::Help),
         ];
@@ -271,7 +354,7 @@ impl Editor {
         let ctrl = pointer.held.ctrl;
         let wants = session.tool.wants_point() || session.trimming.is_some();
         let snap = pointer.pixel.filter(|_| wants).and_then(|pixel| {
-            let filter = session.tool.filter();
+            let filter = session.tool.filter().and(self.pickable);
             viewport.snap(pixel, filter, &session.snap_options(), ctrl)
         });
         if session.snap != snap || session.hover != pointer.hover {
@@ -342,19 +425,27 @@ fn sketch(document: &Document, spec: &HealSpec, kept: &Originals, job: &Job) -> 
     preview(&patch.sides, Some(&set), &options, job)
 }
 
-fn heal(document: &Document, spec: &HealSpec, kept: &Originals, job: &Job) -> Result<Shown, String> {
-    let healing = healing::run(document, spec, job).map_err(|e| e.to_string())?;
-    let (Some(healed), Some((_, patch))) = (healing.healed.patches.first(), healing.patches.first()) else {
+fn heal(
+    document: &Document,
+    spec: &HealSpec,
+    replacing: Option<EntityId>,
+    kept: &Originals,
+    job: &Job,
+) -> Result<Shown, String> {
+    let Joined { healing, new, neighbours } =
+        healing::with_neighbours(document, spec, replacing, &job.part(0.0, 0.9)).map_err(|e| e.to_string())?;
+    let (Some(healed), Some((_, patch))) = (healing.healed.patches.get(new), healing.patches.get(new)) else {
         return Err("The heal was cancelled before there was a patch".to_owned());
     };
-    let complete = healing.healed.complete;
-    // The map is measured even for a partial result: its evidence matters as much.
+    // The map is measured even for a partial result, coarsely: its evidence matters as much, but nobody waits for it.
     let measure = Job::new();
+    let complete = healing.healed.complete;
     job.phase("Measuring deviations");
     let resolved = resolve(spec, document, &measure).map_err(|e| e.to_string())?;
     let set = originals_of(kept, spec.onto.as_ref(), &resolved.surfaces, resolved.options.chord_tol, &measure);
     let surface = Arc::clone(&patch.surface);
     let [per_span, least, most] = LINES;
+    let most = if complete { most } else { least };
     let lines = [0, 1].map(|k| {
         let [a, b] = surface.domain()[k];
         let n = (per_span * patch.report.resolution[k]).clamp(least, most);
@@ -363,8 +454,18 @@ fn heal(document: &Document, spec: &HealSpec, kept: &Originals, job: &Job) -> Re
     let mesh = tessellate_on(&surface, lines, false);
     let diagonal = document.bounds().diagonal();
     let deviation = deviation(&mesh, &set, FAR * diagonal, NOISE * diagonal, &measure);
+    let others = healing.patches.iter().enumerate().filter(|(k, _)| *k != new).map(|(_, (_, p))| Arc::new(p.clone()));
+    let shared = healing.healed.shared.iter().filter(|s| s.patches.contains(&new));
+    let name = |k: usize| healing.patches.get(k).map_or(String::new(), |p| p.0.clone());
     Ok(Shown {
         patch: Arc::new(patch.clone()),
+        neighbours: neighbours.into_iter().zip(others).collect(),
+        seams: shared
+            .map(|s| {
+                let other = if s.patches[0] == new { s.patches[1] } else { s.patches[0] };
+                (name(other), s.max_gap, s.max_normal_angle_deg)
+            })
+            .collect(),
         mesh,
         deviation,
         // One patch only, so its id is of no account.

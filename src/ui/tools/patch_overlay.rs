@@ -18,6 +18,8 @@ use crate::render::{
     Color, ColorScale, Dash, Emphasis, Field, GlyphData, GlyphItem, GlyphShape, Hidden, Key, LineData, LineItem,
     LineRole, LineStyle, MeshData, MeshItem, with_alpha,
 };
+use crate::view::colormap;
+use crate::view::feature_edges::{EdgeKind, EdgePiece, LinePattern};
 use crate::view::patch_tool::{Mode, Stage};
 use crate::view::pick::{PickHit, Target};
 use crate::view::scene::Scene;
@@ -41,6 +43,13 @@ impl Drawing {
     fn line(&mut self, points: impl IntoIterator<Item = DVec3>, width: f32, color: Color, dash: Dash, hidden: Hidden) {
         let mut lines = LineData::new(self.origin);
         lines.push(points);
+        self.lines(lines, width, color, dash, hidden);
+    }
+
+    fn lines(&mut self, lines: LineData, width: f32, color: Color, dash: Dash, hidden: Hidden) {
+        if lines.ends.is_empty() {
+            return;
+        }
         let item = LineItem {
             key: self.key(),
             revision: self.overlay.revision,
@@ -113,6 +122,17 @@ fn hit_curve(scene: &Scene, hit: &PickHit) -> Option<Vec<DVec3>> {
     display.curves.iter().find(|c| c.curve == curve).map(|c| c.points.clone())
 }
 
+/// The part of a drawn curve that an edge is.
+fn stretch(scene: &Scene, piece: &EdgePiece) -> Vec<DVec3> {
+    let Some(item) = scene.curve_item(&piece.curve).filter(|item| item.visible()) else { return Vec::new() };
+    let at = |t: f64| item.geometry.curve_jet(&piece.curve, t).map(|jet| jet[0]);
+    let [from, to] = piece.range;
+    let drawn = item.display.as_ref().and_then(|d| d.curves.iter().find(|c| c.curve == piece.curve));
+    let inner = drawn.into_iter().flat_map(|c| c.t.iter().zip(&c.points));
+    let inner = inner.filter(|(t, _)| from < **t && **t < to).map(|(_, p)| *p);
+    at(from).into_iter().chain(inner).chain(at(to)).collect()
+}
+
 /// The point half-way along a polyline, and the direction there.
 fn middle(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
     let total: f64 = points.windows(2).map(|p| p[0].distance(p[1])).sum();
@@ -137,6 +157,9 @@ impl PatchSession {
         let picking = matches!(self.tool.stage(), Stage::Side(_));
         d.overlay.iso_lines = picking;
         d.overlay.ghost = self.tool.stage() == Stage::Result;
+        if picking {
+            self.candidates(&mut d, scene);
+        }
         self.preview_surface(&mut d, t);
         self.result_surface(&mut d, t);
         for (_, points) in self.tool.reusable() {
@@ -176,6 +199,29 @@ impl PatchSession {
             self.cursor(&mut d, scene, t);
         }
         d.overlay
+    }
+
+    /// The edges of the model by what they are, in colour and stroke.
+    fn candidates(&self, d: &mut Drawing, scene: &Scene) {
+        let Some(edges) = self.edges() else { return };
+        for kind in EdgeKind::ALL {
+            let mut lines = LineData::new(d.origin);
+            for piece in edges.pieces.iter().filter(|p| p.kind == kind) {
+                let points = stretch(scene, piece);
+                if points.len() > 1 {
+                    lines.push(points);
+                }
+            }
+            let ([r, g, b], pattern) = kind.style();
+            let [r, g, b] = colormap::linear([r, g, b]);
+            let (width, dash) = match pattern {
+                LinePattern::Solid => (2.5, Dash::Solid),
+                LinePattern::Thin => (1.2, Dash::Solid),
+                LinePattern::Double => (4.0, Dash::Double),
+                LinePattern::ShortDash => (3.0, Dash::SHORT),
+            };
+            d.lines(lines, width, [r, g, b, 1.0], dash, Hidden::Dashed);
+        }
     }
 
     fn cursor(&self, d: &mut Drawing, scene: &Scene, t: &theme::Tokens) {

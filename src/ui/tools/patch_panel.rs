@@ -11,6 +11,7 @@ use super::Tool;
 use super::patch::PatchSession;
 use crate::kernel::heal::project::Status;
 use crate::model::spec::BoundaryMode;
+use crate::view::feature_edges::{EdgeKind, LinePattern};
 use crate::view::patch_tool::corners::{CornerFix, CornerState};
 use crate::view::patch_tool::{Event, HELP, Key, Options, Stage};
 use crate::view::snap::SnapKind;
@@ -41,10 +42,12 @@ impl Editor {
             Stage::Idle => {}
             Stage::Side(_) | Stage::Review => {
                 sides(ui, session, &mut asks);
+                edges(ui, session);
                 snaps(ui, session);
                 corners(ui, session, &mut asks);
-                samples(ui, session);
+                samples(ui, session, &mut asks);
                 options(ui, session, &visible, surfaces, &mut asks);
+                partial(ui, session, &mut asks);
                 ui.add_space(8.0);
                 let ready = stage == Stage::Review;
                 ui.horizontal(|ui| {
@@ -218,6 +221,62 @@ fn sides(ui: &mut Ui, session: &PatchSession, asks: &mut Vec<Ask>) {
     ui.add_space(6.0);
 }
 
+/// What the coloured edges in the view are, and how many there are of each kind.
+fn edges(ui: &mut Ui, session: &PatchSession) {
+    if !matches!(session.tool.stage(), Stage::Side(_)) {
+        return;
+    }
+    let t = theme::of(ui);
+    let Some(edges) = session.edges() else {
+        ui.horizontal(|ui| {
+            ui.spinner();
+            ui.weak("Looking for free edges and gaps");
+        });
+        return;
+    };
+    let title =
+        format!("Edges of the model: {} free, {} gaps", edges.count(EdgeKind::Free), edges.count(EdgeKind::Gap));
+    egui::CollapsingHeader::new(title).id_salt("edges").show(ui, |ui| {
+        Grid::new("edge kinds").num_columns(3).spacing(vec2(10.0, 3.0)).show(ui, |ui| {
+            for kind in EdgeKind::ALL {
+                let ([r, g, b], pattern) = kind.style();
+                let [r, g, b] = [r, g, b].map(|c| (255.0 * c).round() as u8);
+                stroke(ui, Color32::from_rgb(r, g, b), pattern);
+                ui.label(RichText::new(kind.label()).color(t.text[0]));
+                ui.label(RichText::new(edges.count(kind).to_string()).color(t.text[1]));
+                ui.end_row();
+            }
+        });
+        if !edges.complete {
+            ui.label(RichText::new("The search was stopped; edges may be missing").color(t.warn));
+        }
+    });
+    ui.add_space(6.0);
+}
+
+/// A short line as it is drawn in the view.
+fn stroke(ui: &mut Ui, color: Color32, pattern: LinePattern) {
+    let (rect, _) = ui.allocate_exact_size(vec2(30.0, 14.0), Sense::hover());
+    let y = rect.center().y;
+    let line = |x: egui::Rangef, y: f32, width: f32| {
+        ui.painter().hline(x, y, egui::Stroke::new(width, color));
+    };
+    match pattern {
+        LinePattern::Solid => line(rect.x_range(), y, 2.5),
+        LinePattern::Thin => line(rect.x_range(), y, 1.2),
+        LinePattern::Double => {
+            line(rect.x_range(), y - 1.8, 1.2);
+            line(rect.x_range(), y + 1.8, 1.2);
+        }
+        LinePattern::ShortDash => {
+            for k in 0..4 {
+                let x = rect.left() + 7.5 * k as f32;
+                line(egui::Rangef::new(x, x + 4.0), y, 2.5);
+            }
+        }
+    }
+}
+
 fn snaps(ui: &mut Ui, session: &mut PatchSession) {
     if !session.tool.wants_point() && session.trimming.is_none() {
         return;
@@ -289,7 +348,7 @@ fn corners(ui: &mut Ui, session: &PatchSession, asks: &mut Vec<Ask>) {
     ui.add_space(6.0);
 }
 
-fn samples(ui: &mut Ui, session: &mut PatchSession) {
+fn samples(ui: &mut Ui, session: &mut PatchSession, asks: &mut Vec<Ask>) {
     if !session.tool.is_loop() {
         return;
     }
@@ -329,6 +388,26 @@ fn samples(ui: &mut Ui, session: &mut PatchSession) {
     {
         session.revision += 1;
     }
+    if session.show_slab {
+        let points: Vec<glam::DVec3> = session.tool.corners().iter().map(|c| c.point()).collect();
+        let around: f64 = (0..points.len()).map(|k| points[k].distance(points[(k + 1) % points.len()])).sum();
+        // HJR99 (7) takes an eighth of the way round.
+        let natural = around / 8.0;
+        let mut own = session.tool.options().slab.unwrap_or(slab);
+        ui.horizontal(|ui| {
+            let range = 0.02 * natural..=4.0 * natural;
+            let slider = egui::Slider::new(&mut own, range).logarithmic(true).custom_formatter(|v, _| short(v));
+            let slider = ui.add(slider).accessible_name("Thickness of the box of influence");
+            if slider.on_hover_text("How far from the preview originals are looked for, each way").changed() {
+                let options = Options { slab: Some(own), ..session.tool.options().clone() };
+                asks.push(Ask::Event(Event::Options(Box::new(options))));
+            }
+            if session.tool.options().slab.is_some() && ui.small_button("From the corners").clicked() {
+                let options = Options { slab: None, ..session.tool.options().clone() };
+                asks.push(Ask::Event(Event::Options(Box::new(options))));
+            }
+        });
+    }
     ui.add_space(6.0);
 }
 
@@ -367,12 +446,36 @@ fn options(ui: &mut Ui, session: &PatchSession, visible: &[usize], surfaces: usi
             label(ui, "Joining tolerance");
             tolerance(ui, &mut o.joining_tol, "Joining tolerance");
             ui.end_row();
+            label(ui, "First M, N");
+            let help = "The number of spans along each side that the refinement starts with";
+            ui.add(DragValue::new(&mut o.min_resolution).range(1..=o.max_resolution.max(1)))
+                .accessible_name("First number of spans")
+                .on_hover_text(help);
+            ui.end_row();
             label(ui, "Largest M, N");
             ui.add(DragValue::new(&mut o.max_resolution).range(8..=1024)).accessible_name("Largest number of spans");
             ui.end_row();
             label(ui, "Neighbours K");
             let help = "How many known projections an artificial one is made from";
             ui.add(DragValue::new(&mut o.neighbours).range(1..=64)).accessible_name("Neighbours").on_hover_text(help);
+            ui.end_row();
+            label(ui, "Hardy's R");
+            ui.horizontal(|ui| {
+                let mut own = o.radius.is_some();
+                // Half the sum of the mean spacings of eight spans each way.
+                if ui.checkbox(&mut own, "").accessible_name("Set Hardy's R").changed() {
+                    o.radius = own.then_some(1.0 / 8.0);
+                }
+                match &mut o.radius {
+                    Some(radius) => tolerance(ui, radius, "Hardy's R"),
+                    None => {
+                        ui.label(RichText::new("from the spacing").color(t.text[1]));
+                    }
+                }
+            });
+            ui.end_row();
+            label(ui, "Hardy's gamma");
+            tolerance(ui, &mut o.gamma, "Hardy's gamma");
             ui.end_row();
             label(ui, "Box of influence");
             ui.horizontal(|ui| {
@@ -397,6 +500,23 @@ fn options(ui: &mut Ui, session: &PatchSession, visible: &[usize], surfaces: usi
     if o != *before {
         asks.push(Ask::Event(Event::Options(Box::new(o))));
     }
+}
+
+/// What a cancelled heal had finished.
+fn partial(ui: &mut Ui, session: &PatchSession, asks: &mut Vec<Ask>) {
+    let Some(patch) = session.tool.partial() else { return };
+    let t = theme::of(ui);
+    let [m, n] = patch.report.resolution;
+    ui.add_space(6.0);
+    egui::Frame::new().fill(t.field).corner_radius(5.0).inner_margin(8.0).show(ui, |ui| {
+        ui.set_width(ui.available_width());
+        let error = session.tool.length(patch.report.max_error);
+        ui.label(RichText::new(format!("Cancelled at {m} x {n}, largest error {error}")).color(t.warn));
+        let help = "Show the patch of the last resolution that was finished; it stays marked as incomplete (K)";
+        if ui.button("Keep partial").on_hover_text(help).clicked() {
+            asks.push(Ask::Event(Event::Key(Key::Keep)));
+        }
+    });
 }
 
 fn running(ui: &mut Ui, session: &PatchSession, active: &[crate::work::JobRecord], asks: &mut Vec<Ask>) {
@@ -444,7 +564,15 @@ fn result(ui: &mut Ui, session: &mut PatchSession, unit: crate::model::document:
         panels::property(ui, "Artificial", share(report.artificial));
         panels::property(ui, "Kept", share(report.kept));
         panels::property(ui, "Checked", format!("{}, {} over gaps left out", report.checked, report.skipped));
+        for (name, gap, angle) in &shown.seams {
+            panels::property(ui, "Shared with", format!("{name}: gap {}, normals within {angle:.2}°", length(*gap)));
+        }
     });
+    match shown.neighbours.len() {
+        0 => {}
+        1 => panels::empty(ui, "1 patch next to it was healed anew with it, so that both agree along their boundary"),
+        n => panels::empty(ui, &format!("{n} patches next to it were healed anew with it, so that all agree")),
+    }
     ui.add_space(6.0);
     panels::heading(ui, "Deviation");
     session.histogram(ui, unit);

@@ -40,7 +40,7 @@ impl Editor {
         };
         for &action in next {
             let info = actions::info(action);
-            let shortcut = info.shortcut.map(|s| ui.ctx().format_shortcut(&s)).unwrap_or_default();
+            let shortcut = info.keys(ui.ctx());
             let button =
                 egui::Button::new(info.name).shortcut_text(shortcut).min_size(egui::vec2(ui.available_width(), 28.0));
             let enabled = self.enabled(action);

@@ -11,6 +11,8 @@ use crate::view::snap::{Snap, SnapOptions, snap};
 
 /// Points of scrolling that count as one notch of the wheel.
 const NOTCH: f32 = 40.0;
+/// Seconds after which a press that does not move opens the list of what is under the cursor.
+const HOLD: f64 = 0.4;
 /// Farther than this between press and release, and it was no click.
 const CLICK: f32 = 5.0;
 
@@ -115,11 +117,14 @@ impl Viewport {
             self.from_list = None;
             return out;
         }
-        self.left_button(ui, response, &mut out, at);
+        let held_still = self.left_button(ui, response, &mut out, at);
         out.hover = self.hover_at(pixel, filter, points, stamp);
         self.cursor_at = out.hover.as_ref().map(|hit| (hit.point, self.hit_uv(hit)));
         self.hovered = out.hover.as_ref().and_then(hit_entity).or(self.from_list.take());
-        if out.click.is_some() {
+        if held_still {
+            let options = self.options(filter, points);
+            out.list = Some(pick_all(&self.scene, &self.view(), pixel, &options));
+        } else if out.click.is_some() {
             let options = self.options(filter, points);
             let mut hits = pick_all(&self.scene, &self.view(), pixel, &options);
             if modifiers.alt {
@@ -141,20 +146,29 @@ impl Viewport {
         out
     }
 
-    /// The press, drag and release of the left button.
-    fn left_button(&mut self, ui: &Ui, response: &Response, out: &mut Pointer, at: egui::Pos2) {
-        let (pressed, released, down) =
-            ui.input(|i| (i.pointer.primary_pressed(), i.pointer.primary_released(), i.pointer.primary_down()));
+    /// The press, drag and release of the left button. True when it has just been held still for long enough.
+    fn left_button(&mut self, ui: &Ui, response: &Response, out: &mut Pointer, at: egui::Pos2) -> bool {
+        let (pressed, released, down, now) =
+            ui.input(|i| (i.pointer.primary_pressed(), i.pointer.primary_released(), i.pointer.primary_down(), i.time));
         if pressed && response.contains_pointer() {
-            self.pressed = Some(at);
+            (self.pressed, self.hold_from) = (Some(at), Some(now));
         }
-        let Some(start) = self.pressed else { return };
+        let Some(start) = self.pressed else { return false };
         out.pressed = down;
         let moved = (at - start).length() > CLICK;
         if moved || self.dragging {
             out.drag = Some((self.to_pixel(start), self.to_pixel(at)));
             out.drag_started = !self.dragging;
             self.dragging = true;
+        }
+        if let Some(from) = self.hold_from.filter(|_| down && !self.dragging) {
+            let left = HOLD - (now - from);
+            if left <= 0.0 {
+                // The release that follows is no click.
+                (self.pressed, self.hold_from) = (None, None);
+                return true;
+            }
+            ui.ctx().request_repaint_after(std::time::Duration::from_secs_f64(left));
         }
         if released {
             out.drag_ended = self.dragging;
@@ -165,6 +179,7 @@ impl Viewport {
         } else if !down {
             (self.pressed, self.dragging) = (None, false);
         }
+        false
     }
 
     fn navigate(&mut self, ui: &Ui, response: &Response, preset: Preset, modifiers: Modifiers, pixel: DVec2) {

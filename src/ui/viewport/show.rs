@@ -129,7 +129,7 @@ impl Editor {
             ];
             for action in list {
                 let info = actions::info(action);
-                let shortcut = info.shortcut.map(|s| ui.ctx().format_shortcut(&s)).unwrap_or_default();
+                let shortcut = info.keys(ui.ctx());
                 let button = egui::Button::new(info.name).shortcut_text(shortcut);
                 if ui.add_enabled(self.enabled(action).is_ok(), button).clicked() {
                     ui.close();

@@ -10,9 +10,9 @@ impl PatchTool {
     pub(super) fn act(&mut self, event: Event, scene: &Scene) -> Vec<Effect> {
         match event {
             Event::Start => self.start(),
-            Event::StartWith(spec) => {
+            Event::StartWith(spec, settings) => {
                 self.start();
-                let missing = self.load(&spec, scene);
+                let missing = self.load(&spec, &settings, scene);
                 self.stage = match (0..4).find(|&k| self.sides[k].pieces.is_empty()) {
                     Some(k) => Stage::Side(k),
                     None => Stage::Review,
@@ -33,12 +33,7 @@ impl PatchTool {
                 }
             }
             Event::Finished(outcome) => self.finished(outcome),
-            Event::Cancelled => {
-                if self.stage == Stage::Running {
-                    self.stage = Stage::Review;
-                    self.say("Cancelled; the sides are kept");
-                }
-            }
+            Event::Cancelled(partial) => self.cancelled(partial),
             Event::Reuse { side } => self.reuse(side),
         }
         Vec::new()
@@ -52,6 +47,35 @@ impl PatchTool {
         self.other_loop = false;
         self.chosen.clear();
         self.result = None;
+        self.partial = None;
+    }
+
+    fn cancelled(&mut self, partial: Option<std::sync::Arc<crate::model::document::Patch>>) {
+        if self.stage == Stage::Running {
+            self.stage = Stage::Review;
+        }
+        if self.stage != Stage::Review {
+            return;
+        }
+        match &partial {
+            Some(patch) => {
+                let [m, n] = patch.report.resolution;
+                let error = self.length(patch.report.max_error);
+                self.say(format!("Cancelled at {m} x {n} with a largest error of {error}; K keeps this patch"));
+            }
+            None => self.say("Cancelled before there was a patch; the sides are kept"),
+        }
+        self.partial = partial;
+    }
+
+    fn keep_partial(&mut self) {
+        match self.partial.take().filter(|_| self.stage == Stage::Review) {
+            Some(patch) => {
+                self.stage = Stage::Result;
+                self.result = Some(patch);
+            }
+            None => self.refuse("K keeps what a cancelled heal had finished; there is nothing of that kind"),
+        }
     }
 
     pub(super) fn key(&mut self, key: Key, scene: &Scene) -> Vec<Effect> {
@@ -69,6 +93,7 @@ impl PatchTool {
             Key::Trim => self.trim_all(scene),
             Key::Preview => self.show_preview = !self.show_preview,
             Key::Deviation => self.show_deviation = !self.show_deviation,
+            Key::Keep => self.keep_partial(),
             Key::Help => self.show_help = !self.show_help,
         }
         Vec::new()
@@ -93,7 +118,7 @@ impl PatchTool {
             }
             Stage::Running => {
                 self.stage = Stage::Review;
-                self.say("Cancelled; the sides are kept");
+                self.say("Cancelling; the sides are kept");
                 return vec![Effect::Cancel];
             }
             Stage::Result => {
@@ -158,6 +183,7 @@ impl PatchTool {
         match self.heal_spec(scene) {
             Ok(spec) => {
                 self.stage = Stage::Running;
+                self.partial = None;
                 vec![Effect::Run(Box::new(spec))]
             }
             Err(error) => {
@@ -189,8 +215,7 @@ impl PatchTool {
         let name = self.options.name.clone();
         self.last = Some(Box::new(self.sides.clone()));
         self.start();
-        self.count += 1;
-        self.options.name = format!("patch {}", self.count + 1);
+        self.options.name = next_name(&name);
         self.say(format!(
             "Accepted {name}; click one of its sides to share it with the neighbour patch, or Esc to leave"
         ));
@@ -337,5 +362,14 @@ impl PatchTool {
                 None => self.refuse("These two sides do not cross within the joining tolerance"),
             },
         }
+    }
+}
+
+/// The name after a name: its number one higher, or a number behind it.
+fn next_name(name: &str) -> String {
+    let stem = name.trim_end_matches(|c: char| c.is_ascii_digit());
+    match name[stem.len()..].parse::<u64>() {
+        Ok(number) => format!("{stem}{}", number.saturating_add(1)),
+        Err(_) => format!("{} 2", name.trim_end()),
     }
 }

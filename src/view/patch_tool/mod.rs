@@ -113,6 +113,8 @@ pub enum Key {
     Preview,
     /// D: the deviation map on or off.
     Deviation,
+    /// K: keep what a cancelled heal had finished.
+    Keep,
     /// ?: the list of keys on or off.
     Help,
 }
@@ -122,8 +124,8 @@ pub enum Key {
 pub enum Event {
     /// Start picking.
     Start,
-    /// Start with sides filled in (from a defect, a replay, or an accepted patch).
-    StartWith(Box<PatchSpec>),
+    /// Start with sides filled in (from a defect, a replay, or an accepted patch) and with the settings of that heal.
+    StartWith(Box<PatchSpec>, Box<HealSpec>),
     /// A click of the left button.
     Click {
         /// What was picked with [`PatchTool::filter`]; nothing on the background.
@@ -171,8 +173,8 @@ pub enum Event {
     },
     /// The worker is done: a patch, or why there is none.
     Finished(Result<Arc<Patch>, String>),
-    /// The worker was cancelled before there was anything to keep.
-    Cancelled,
+    /// The worker was cancelled; with the patch of the last resolution that it had finished, if any.
+    Cancelled(Option<Arc<Patch>>),
     /// A side of the patch that was accepted last is shared with the one being picked.
     Reuse {
         /// Which side of that patch.
@@ -209,6 +211,8 @@ pub struct Options {
     pub joining_tol: f64,
     /// The largest error wanted.
     pub tol: f64,
+    /// The number of spans along each side to start with.
+    pub min_resolution: usize,
     /// The largest number of spans along one side.
     pub max_resolution: usize,
     /// The surfaces to project on, by number; all when `None`.
@@ -217,19 +221,56 @@ pub struct Options {
     pub slab: Option<f64>,
     /// How many known projections an artificial one is made from.
     pub neighbours: usize,
+    /// The exponent of Hardy's method.
+    pub gamma: f64,
+    /// R of Hardy's method; from the parameter spacings when `None`.
+    pub radius: Option<f64>,
+    /// How far the triangles may be off the surfaces; by the model's size when `None`.
+    pub chord_tol: Option<f64>,
 }
 
 impl Options {
     /// The defaults for a model.
     pub fn of(tolerances: &Tolerances) -> Self {
+        Self::with("Patch 1".to_owned(), [tolerances.joining, 0.1 * tolerances.joining], &HealSpec::default())
+    }
+
+    /// Takes over the settings of a heal; tolerances that it leaves out stay.
+    pub fn take(&mut self, settings: &HealSpec) {
+        *self = Self::with(std::mem::take(&mut self.name), [self.joining_tol, self.tol], settings);
+    }
+
+    /// `defaults` are the joining tolerance and the largest error of settings that have none.
+    fn with(name: String, defaults: [f64; 2], settings: &HealSpec) -> Self {
         Self {
-            name: "patch 1".to_owned(),
-            joining_tol: tolerances.joining,
-            tol: 0.1 * tolerances.joining,
-            max_resolution: 128,
-            onto: None,
-            slab: None,
-            neighbours: 8,
+            name,
+            joining_tol: settings.joining_tol.unwrap_or(defaults[0]),
+            tol: settings.tol.unwrap_or(defaults[1]),
+            min_resolution: settings.min_resolution,
+            max_resolution: settings.max_resolution,
+            onto: settings.onto.clone(),
+            slab: settings.slab,
+            neighbours: settings.neighbours,
+            gamma: settings.gamma,
+            radius: settings.radius,
+            chord_tol: settings.chord_tol,
+        }
+    }
+
+    /// The settings of a heal with these options.
+    pub fn settings(&self) -> HealSpec {
+        HealSpec {
+            joining_tol: Some(self.joining_tol),
+            tol: Some(self.tol),
+            min_resolution: self.min_resolution,
+            max_resolution: self.max_resolution,
+            onto: self.onto.clone(),
+            slab: self.slab,
+            neighbours: self.neighbours,
+            gamma: self.gamma,
+            radius: self.radius,
+            chord_tol: self.chord_tol,
+            ..HealSpec::default()
         }
     }
 }
@@ -275,8 +316,8 @@ pub struct PatchTool {
     show_deviation: bool,
     show_help: bool,
     result: Option<Arc<Patch>>,
+    partial: Option<Arc<Patch>>,
     last: Option<Box<[SidePick; 4]>>,
-    count: usize,
     edges: Arc<Edges>,
     // Made from the above after every event.
     lines: [Option<SideLine>; 4],
@@ -303,8 +344,8 @@ impl PatchTool {
             show_deviation: true,
             show_help: false,
             result: None,
+            partial: None,
             last: None,
-            count: 0,
             edges: Arc::default(),
             lines: [None, None, None, None],
             layout: Layout::Nothing,
@@ -395,6 +436,11 @@ impl PatchTool {
         self.result.as_ref().filter(|_| self.stage == Stage::Result)
     }
 
+    /// What a cancelled heal had finished, as long as the sides and options are still those that it was made from.
+    pub fn partial(&self) -> Option<&Arc<Patch>> {
+        self.partial.as_ref().filter(|_| self.stage == Stage::Review)
+    }
+
     /// What the last event had to say.
     pub fn notice(&self) -> Option<&Notice> {
         self.notice.as_ref()
@@ -444,6 +490,9 @@ impl PatchTool {
             event => self.act(event, scene),
         };
         self.refresh();
+        if self.signature() != before {
+            self.partial = None;
+        }
         // Four sides that changed are worth a new look at what they would meet.
         if self.is_loop() && matches!(self.stage, Stage::Side(_) | Stage::Review) && self.signature() != before {
             match self.heal_spec(scene) {
@@ -481,10 +530,10 @@ impl PatchTool {
     }
 
     /// What the preview depends on, to see whether it changed.
-    fn signature(&self) -> (Vec<Vec<Picked>>, [bool; 4], bool, Vec<Chosen>, Options) {
+    fn signature(&self) -> (Vec<Vec<Picked>>, [(bool, BoundaryMode); 4], bool, Vec<Chosen>, Options) {
         (
             self.sides.iter().map(|s| s.pieces.clone()).collect(),
-            [0, 1, 2, 3].map(|k: usize| self.sides[k].flipped),
+            [0, 1, 2, 3].map(|k: usize| (self.sides[k].flipped, self.sides[k].boundary)),
             self.other_loop,
             self.chosen.clone(),
             self.options.clone(),

@@ -7,6 +7,7 @@ use super::follow::joint_angles;
 use super::piece::{Picked, PieceError};
 use super::{Mode, PatchTool, SidePick, Stage, sentence};
 use crate::kernel::geom::Direction;
+use crate::model::document::{EntityId, Shape};
 use crate::view::display::CurveRef;
 use crate::view::navigation::Modifiers;
 use crate::view::pick::{PickHit, Target};
@@ -53,23 +54,14 @@ impl PatchTool {
         };
         match hit.target {
             Target::Curve { curve, t } => self.click_curve(side, curve, t, hit.point, held, scene),
-            Target::Surface { entity, uv } => self.click_surface(entity, uv, hit.point, scene),
+            Target::Surface { entity, uv } => self.click_surface(entity, uv, scene),
             Target::Point(_) => self.refuse("A point is no side; L draws a segment between two points"),
         }
     }
 
-    pub(super) fn click_surface(
-        &mut self,
-        entity: crate::model::document::EntityId,
-        uv: DVec2,
-        point: DVec3,
-        scene: &Scene,
-    ) {
+    pub(super) fn click_surface(&mut self, entity: EntityId, uv: DVec2, scene: &Scene) {
         if scene.item(entity).is_some_and(|item| item.kind == ItemKind::Patch) {
-            match self.reusable_at(point) {
-                Some(side) => self.reuse(side),
-                None => self.refuse("A healed patch has no iso-curves to pick; click one of its sides to share it"),
-            }
+            self.refuse("A healed patch has no iso-curves to pick; click one of its sides to share it");
             return;
         }
         if scene.item(entity).is_some_and(|item| item.kind == ItemKind::Mesh) {
@@ -90,10 +82,10 @@ impl PatchTool {
         held: Modifiers,
         scene: &Scene,
     ) {
-        if scene.curve_item(&curve).is_some_and(|item| item.kind == ItemKind::Patch) {
-            match self.reusable_at(point) {
-                Some(side) => self.reuse(side),
-                None => self.refuse("Only the patch that was accepted last can share its sides"),
+        if let Some(item) = scene.curve_item(&curve).filter(|item| item.kind == ItemKind::Patch) {
+            match side_at(scene, item.id(), point) {
+                Some(source) => self.share(source),
+                None => self.refuse("This patch's sides are gone from the model; pick other curves"),
             }
             return;
         }
@@ -266,19 +258,18 @@ impl PatchTool {
         self.add(side, if other { second } else { first });
     }
 
-    pub(super) fn reusable_at(&self, point: DVec3) -> Option<usize> {
-        let tol = 2.0 * self.options.joining_tol;
-        let sides = self.reusable().into_iter().map(|(k, points)| (k, super::piece::nearest_on(&points, point).1));
-        sides.filter(|(_, d)| *d <= tol).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
+    /// Shares a side of the patch that was accepted last.
+    pub(super) fn reuse(&mut self, from: usize) {
+        match self.last.as_ref().and_then(|last| last.get(from)).cloned() {
+            Some(source) => self.share(source),
+            None => self.refuse("There is no accepted patch to share a side with"),
+        }
     }
 
-    pub(super) fn reuse(&mut self, from: usize) {
+    /// Makes a side of an accepted patch a side of this one, whole and with what becomes of its curve.
+    fn share(&mut self, source: SidePick) {
         let Stage::Side(current) = self.stage else {
             self.refuse("A side can be shared while sides are picked");
-            return;
-        };
-        let Some(source) = self.last.as_ref().and_then(|last| last.get(from)).cloned() else {
-            self.refuse("There is no accepted patch to share a side with");
             return;
         };
         if self.sides.iter().any(|s| s.pieces == source.pieces) {
@@ -295,6 +286,23 @@ impl PatchTool {
         self.stage = Stage::Side(side);
         self.say(format!("Side {} is shared with the accepted patch", side + 1));
     }
+}
+
+/// The side of an accepted patch that is nearest to a point.
+fn side_at(scene: &Scene, patch: EntityId, point: DVec3) -> Option<SidePick> {
+    let Shape::Patch(patch) = &scene.item(patch)?.entity.shape else { return None };
+    let mut best: Option<(f64, SidePick)> = None;
+    for (pieces, boundary) in patch.spec.sides.iter().zip(patch.spec.boundary) {
+        let Ok(pieces) = pieces.iter().map(|p| Picked::from_piece(scene, p)).collect::<Result<Vec<_>, _>>() else {
+            continue;
+        };
+        let Some(line) = arrange::chain(&pieces) else { continue };
+        let (_, far) = super::piece::nearest_on(&line.points, point);
+        if best.as_ref().is_none_or(|(d, _)| far < *d) {
+            best = Some((far, SidePick { pieces, boundary, ..SidePick::default() }));
+        }
+    }
+    best.map(|b| b.1)
 }
 
 fn ends_apart(line: &SideLine, piece: &Picked) -> f64 {

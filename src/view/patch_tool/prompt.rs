@@ -18,7 +18,7 @@ const fn line(key: &'static str, what: &'static str) -> HelpLine {
 }
 
 /// The keys while the tool runs.
-pub const HELP: [HelpLine; 18] = [
+pub const HELP: [HelpLine; 19] = [
     line("Click", "add a curve to the side, or choose an iso-curve of a surface"),
     line("Shift+click", "split the curve at the point"),
     line("Click again", "the next thing under the cursor"),
@@ -37,6 +37,7 @@ pub const HELP: [HelpLine; 18] = [
     line("C", "trim the sides where they cross"),
     line("V", "preview on or off"),
     line("D", "deviation map on or off"),
+    line("K", "keep what a cancelled heal had finished"),
 ];
 
 /// A length with four digits and its unit.
@@ -152,6 +153,9 @@ impl PatchTool {
             parts.push(format!("{closed_by_hand} closed by hand"));
         }
         let settled = self.corners.iter().all(super::corners::Corner::is_settled);
+        if self.partial.is_some() {
+            parts.push("K keep the cancelled patch".to_owned());
+        }
         parts.push(if settled { "Enter heal" } else { "Choose on the corner card" }.to_owned());
         parts.extend(["1-4 change a side", "V preview", "Esc cancel"].map(str::to_owned));
         parts
@@ -162,7 +166,11 @@ impl PatchTool {
         let report = &patch.report;
         let samples = report.projected + report.artificial;
         let share = if samples > 0 { 100.0 * report.artificial as f64 / samples as f64 } else { 0.0 };
-        let verdict = if report.reached { "Healed" } else { "Healed, tolerance not reached" };
+        let verdict = match (report.incomplete, report.reached) {
+            (true, _) => "Healed in part, cancelled before the end",
+            (false, true) => "Healed",
+            (false, false) => "Healed, tolerance not reached",
+        };
         format!("{verdict}, max error {}, {share:.0} % artificial", self.length(report.max_error))
     }
 }

@@ -5,7 +5,7 @@ use super::corners::{CornerFix, CornerState};
 use super::piece::{Picked, PieceError};
 use super::{PatchTool, SidePick};
 use crate::model::spec::{Arrangement, EndMove, HealSpec, Joining, PatchSpec};
-use crate::view::scene::Scene;
+use crate::view::scene::{ItemKind, Scene};
 
 impl PatchTool {
     /// The sides as a specification: each side's pieces in the order and direction of its chain, so that reading it
@@ -52,20 +52,16 @@ impl PatchTool {
 
     /// The whole heal of this one patch.
     pub fn heal_spec(&self, scene: &Scene) -> Result<HealSpec, PieceError> {
-        Ok(HealSpec {
-            joining_tol: Some(self.options.joining_tol),
-            tol: Some(self.options.tol),
-            max_resolution: self.options.max_resolution,
-            onto: self.options.onto.clone(),
-            slab: self.options.slab,
-            neighbours: self.options.neighbours,
-            patches: vec![self.patch_spec(scene)?],
-        })
+        Ok(self.options.settings().with_patches(vec![self.patch_spec(scene)?]))
     }
 
     /// Takes the sides of a specification over. Pieces that are not there are left out and named.
-    pub(super) fn load(&mut self, spec: &PatchSpec, scene: &Scene) -> Vec<String> {
+    pub(super) fn load(&mut self, spec: &PatchSpec, settings: &HealSpec, scene: &Scene) -> Vec<String> {
         let mut missing = Vec::new();
+        self.options.take(settings);
+        // All surfaces by number are all surfaces.
+        let count = scene.items().iter().filter(|item| item.kind == ItemKind::Surface).count();
+        self.options.onto = self.options.onto.take().filter(|list| (0..count).any(|k| !list.contains(&k)));
         for (k, pieces) in spec.sides.iter().enumerate() {
             self.sides[k] = SidePick { boundary: spec.boundary[k], ..SidePick::default() };
             for piece in pieces {

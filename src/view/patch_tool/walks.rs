@@ -202,10 +202,10 @@ fn a_patch_over_iso_curves_heals_and_its_side_is_shared_with_the_neighbour() {
     assert!(w.refused(), "a click while judging says what to do");
     let effects = w.key(Key::Enter);
     let [Effect::Accept { name, .. }] = &effects[..] else { panic!("{effects:?}") };
-    assert_eq!(name, "patch 1");
+    assert_eq!(name, "Patch 1");
     assert_eq!(w.tool.stage(), Stage::Side(0));
     assert!(w.notice().contains("share it with the neighbour"));
-    assert_eq!(w.tool.options().name, "patch 2");
+    assert_eq!(w.tool.options().name, "Patch 2");
     // The neighbour: share the right side (the second one), and only whole.
     assert_eq!(w.tool.reusable().len(), 4);
     w.send(Event::Reuse { side: 1 });
@@ -461,7 +461,7 @@ fn an_open_corner_is_amber_and_can_be_closed_in_every_way() {
         assert!(answer.as_ref().err().is_none_or(|e| !e.contains("do not close")), "{answer:?}");
         // And a replay finds them again.
         let mut again = Walk::new(tiles_with_gap(gap));
-        again.send(Event::StartWith(Box::new(spec.clone())));
+        again.send(Event::StartWith(Box::new(spec.clone()), Box::default()));
         assert!(again.tool.corners().iter().all(Corner::is_settled));
         assert_eq!(again.tool.patch_spec(&again.scene).unwrap(), spec);
     }
@@ -506,7 +506,7 @@ fn of_two_loops_that_fit_tab_takes_the_other_and_the_specification_says_so() {
     let arrangement = spec.joining.arrangement.unwrap();
     assert_eq!(arrangement.reversed.to_vec(), w.tool.order().unwrap().reversed);
     let other = w.tool.order().cloned();
-    w.send(Event::StartWith(Box::new(spec)));
+    w.send(Event::StartWith(Box::new(spec), Box::default()));
     assert_eq!(w.tool.order().cloned(), other, "a replay takes the same loop");
     w.key(Key::Tab);
     assert_eq!(w.tool.order().cloned(), first);
@@ -519,7 +519,8 @@ fn adjusting_goes_back_to_a_side_and_discarding_keeps_the_sides() {
     w.key(Key::Enter);
     w.key(Key::Enter);
     let surface = Arc::new(Surface::bilinear([DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::ONE]).unwrap());
-    let patch = crate::model::document::Patch { surface, spec: PatchSpec::default(), report: Default::default() };
+    let (spec, settings, report) = Default::default();
+    let patch = crate::model::document::Patch { surface, spec, settings, report };
     w.send(Event::Finished(Ok(Arc::new(patch.clone()))));
     assert!(w.tool.result().is_some() && w.tool.prompt().contains("tolerance not reached"));
     w.key(Key::Escape);
@@ -531,6 +532,38 @@ fn adjusting_goes_back_to_a_side_and_discarding_keeps_the_sides() {
     assert!(w.notice().contains("until Enter"));
     w.key(Key::Backspace);
     assert_eq!(w.counts(), [1, 0, 1, 1]);
+}
+
+#[test]
+fn what_a_cancelled_heal_had_can_be_kept_until_something_changes() {
+    let mut w = Walk::on_tiles();
+    w.pick_hole();
+    w.key(Key::Enter);
+    let effects = w.key(Key::Enter);
+    let mut patch = (*w.heal(&effects).unwrap()).clone();
+    patch.report.incomplete = true;
+    let patch = Arc::new(patch);
+    assert!(matches!(w.key(Key::Escape)[..], [Effect::Cancel]));
+    assert_eq!(w.tool.stage(), Stage::Review, "acknowledged at once");
+    w.key(Key::Keep);
+    assert!(w.refused(), "not there yet");
+    w.send(Event::Cancelled(Some(Arc::clone(&patch))));
+    assert!(w.notice().contains("K keeps") && w.tool.prompt().contains("K keep"), "{}", w.tool.prompt());
+    w.key(Key::Keep);
+    assert!(w.tool.prompt().contains("in part"), "{}", w.tool.prompt());
+    let accepted = w.key(Key::Enter);
+    assert!(matches!(&accepted[..], [Effect::Accept { patch, .. }] if patch.report.incomplete));
+    // Another wish makes it stale.
+    w.pick_hole();
+    w.key(Key::Enter);
+    w.key(Key::Enter);
+    w.key(Key::Escape);
+    w.send(Event::Cancelled(Some(patch)));
+    let options = Options { tol: 7.0, ..w.tool.options().clone() };
+    w.send(Event::Options(Box::new(options)));
+    assert!(w.tool.partial().is_none());
+    w.key(Key::Keep);
+    assert!(w.refused());
 }
 
 #[test]
