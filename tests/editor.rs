@@ -367,12 +367,12 @@ fn holding_still_lists_what_is_under_the_cursor_and_the_filter_narrows_it() {
     assert!(window.state().editor.pick_list.is_some() && window.state().editor.selection.is_empty());
     key(&mut window, Modifiers::NONE, Key::Escape);
     for kind in ["Curves", "Surfaces"] {
-        window.get_by_label(kind).click();
+        window.get_by_role_and_label(egui::Role::Button, kind).click();
         settle(&mut window);
     }
     click(&mut window, at);
     assert!(window.state().editor.selection.is_empty(), "nothing that may be picked is there");
-    window.get_by_label("Surfaces").click();
+    window.get_by_role_and_label(egui::Role::Button, "Surfaces").click();
     settle(&mut window);
     click(&mut window, at);
     assert_eq!(window.state().editor.selection.ids().len(), 1);
@@ -536,7 +536,7 @@ fn a_killed_session_is_offered_and_comes_back_as_it_was() {
     assert!(after.query_by_label_contains("surfaces_with_gap").is_some(), "the file of the lost session is named");
     assert!(after.query_by_label_contains("2 changes").is_some(), "and how much was done");
     picture(&mut after, "editor_recovery");
-    after.get_by_label_contains("Recover").click();
+    after.get_by_label("Recover").click();
     settle(&mut after);
     let editor = &after.state().editor;
     assert_eq!(patchwright::io::project::write(editor.document()).unwrap(), expected);

@@ -245,3 +245,29 @@ fn the_crossing_region_of_a_real_model_is_healed() {
         }
     }
 }
+
+#[test]
+fn the_open_ring_of_a_real_model_is_bridged() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let path = folder.join("../shared/data/models/pocc_surf114.igs");
+    if !path.exists() {
+        println!("skipped: no shared data");
+        return;
+    }
+    let document = io::open(&path).unwrap().document;
+    let text = std::fs::read_to_string(folder.join("tests/data/pocc_ring.heal.ron")).unwrap();
+    let healing = healing::run(&document, &HealSpec::from_ron(&text).unwrap(), &Job::new()).unwrap();
+    assert!(healing.patches.iter().all(|(_, patch)| patch.report.reached));
+    // Both ways round: two common boundaries, without a gap.
+    assert!(healing.healed.shared.len() == 2 && healing.healed.shared.iter().all(|s| s.max_gap == 0.0));
+    // The rings missed each other by a millimetre; every point of either now lies on a patch.
+    let patches = healing.patches.iter().enumerate().map(|(k, (_, p))| (k, Arc::clone(&p.surface))).collect();
+    let patches = SurfaceSet::new(patches, 1e-5, &Job::new());
+    for (surface, side) in [(1, Side::VMax), (3, Side::UMin)] {
+        let ring = document.surfaces().nth(surface).unwrap().1.border(side).unwrap();
+        for (_, p) in ring.sampled(8) {
+            let foot = patches.closest(p, f64::INFINITY, &mut Default::default()).unwrap();
+            assert!(foot.distance < 1e-4, "{}", foot.distance);
+        }
+    }
+}

@@ -114,6 +114,10 @@ pub fn with_neighbours(
     job: &Job,
 ) -> Result<Joined, HealingError> {
     let Some(wanted) = spec.patches.first() else { return Err(HealError::NoPatch.into()) };
+    if document.patches().all(|(id, _)| Some(id) == replacing) {
+        let alone = spec.with_patches(vec![wanted.clone()]);
+        return Ok(Joined { healing: run(document, &alone, job)?, new: 0, neighbours: Vec::new() });
+    }
     let input_of = |patch: &PatchSpec| {
         let resolved = resolve(&spec.with_patches(vec![patch.clone()]), document, job)?;
         resolved.patches.into_iter().next().ok_or(HealingError::Heal(HealError::NoPatch))

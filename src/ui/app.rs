@@ -94,8 +94,6 @@ pub struct App {
     pub editor: Editor,
     hints: Option<Arc<Mutex<hints::State>>>,
     numpad: Numpad,
-    /// The digits pressed on the numeric pad since the last frame.
-    pad: Vec<(Modifiers, Key)>,
 }
 
 impl App {
@@ -139,18 +137,19 @@ impl App {
             editor.offer_recovery(journal.recoverable());
         }
         let hints = options.hints.map(|path| Hints::install(ctx, path));
-        Self { editor, hints, numpad: options.numpad, pad: Vec::new() }
+        Self { editor, hints, numpad: options.numpad }
     }
 
     /// Shortcuts of the active tool first, then those of the actions.
     fn keys(&mut self, ctx: &egui::Context) {
         // An open menu has the keyboard: Esc closes it and nothing else.
         let menu = egui::Popup::is_any_open(ctx);
-        let pad = std::mem::take(&mut self.pad);
-        if menu || self.editor.dialog.is_some() || self.editor.palette.is_some() {
+        let elsewhere = menu || self.editor.dialog.is_some() || self.editor.palette.is_some();
+        let typing = ctx.text_edit_focused();
+        let pad = ctx.input_mut(|input| self.numpad.take(&mut input.events, elsewhere || typing));
+        if elsewhere {
             return;
         }
-        let typing = ctx.text_edit_focused();
         if !typing {
             self.editor.tool_keys(ctx);
         }
@@ -246,10 +245,6 @@ fn same_modifiers(a: Modifiers, b: Modifiers) -> bool {
 }
 
 impl eframe::App for App {
-    fn raw_input_hook(&mut self, ctx: &egui::Context, raw: &mut egui::RawInput) {
-        self.pad.extend(self.numpad.take(&mut raw.events, ctx.text_edit_focused()));
-    }
-
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
         self.editor.poll_files(ctx);
         self.editor.poll_export();
@@ -345,6 +340,7 @@ impl App {
             dirty: editor.history.is_dirty(),
             title: editor.files.title.clone(),
             curves: editor.curve_hints(ctx.pixels_per_point()),
+            surfaces: editor.surface_hints(ctx.pixels_per_point()),
             ..hints::State::default()
         };
         *slot.lock().unwrap_or_else(PoisonError::into_inner) = state;

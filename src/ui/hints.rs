@@ -7,13 +7,15 @@
 //! {"frame": 12, "busy": false, "page": "Tool", "dialog": "", "prompt": "Patch · Pick side 1 of 4",
 //!  "entities": 4, "patches": 0, "dirty": false, "title": "part.igs",
 //!  "buttons": {"Open": [20.0, 45.0], "File": [22.0, 14.0]},
-//!  "curves": [{"entity": 3, "name": "Surface 1", "curve": "border u max", "at": [512.0, 300.5]}]}
+//!  "curves": [{"entity": 3, "name": "Surface 1", "curve": "border u max", "at": [512.0, 300.5]}],
+//!  "surfaces": [{"entity": 3, "name": "Surface 1", "uv": [0.25, 0.5], "at": [498.0, 310.0]}]}
 //! ```
 //!
 //! Positions are pixels from the window's upper left corner. `busy` is true while anything is computed or drawn
 //! that may still move them. `buttons` holds every named widget that takes clicks and is in the window; of several
 //! with one name the first keeps it and the others are `name#2` and so on. `curves` holds one point of every
-//! curve that the active tool lets one pick and that is not hidden behind something else there.
+//! curve that the active tool lets one pick and that is not hidden behind something else there; `surfaces` places in which
+//! a click picks the surface, with the parameters there.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -31,6 +33,19 @@ pub struct CurveHint {
     /// Which of its curves.
     pub curve: String,
     /// A point on it.
+    pub at: [f32; 2],
+}
+
+/// One place of a surface that can be picked.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SurfaceHint {
+    /// The entity's number.
+    pub entity: u64,
+    /// The entity's name.
+    pub name: String,
+    /// The parameters there.
+    pub uv: [f64; 2],
+    /// The point.
     pub at: [f32; 2],
 }
 
@@ -59,6 +74,8 @@ pub struct State {
     pub buttons: BTreeMap<String, [f32; 2]>,
     /// The curves that can be picked.
     pub curves: Vec<CurveHint>,
+    /// Places of the surfaces that can be picked.
+    pub surfaces: Vec<SurfaceHint>,
 }
 
 /// Writes positions for scripts whenever a frame has ended.

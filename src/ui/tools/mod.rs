@@ -6,10 +6,11 @@ use egui::{Order, Ui, vec2};
 use glam::{DVec2, DVec3};
 
 use super::editor::Editor;
-use super::hints::CurveHint;
+use super::hints::{CurveHint, SurfaceHint};
 use super::panels::uv::UvPointer;
 use super::viewport::{Overlay, Pointer, curve_name};
 use super::{status, theme};
+use crate::view::display::Geometry;
 use crate::view::patch_tool::{Event, Stage};
 use crate::view::pick::{Filter, PickHit, Target};
 use crate::view::uv::UvPicture;
@@ -201,6 +202,40 @@ impl Editor {
                 self.patch_event(Event::Click { hit: Some(hit), snap: None, held });
             }
         }
+    }
+
+    /// Places of the surfaces on a grid in their parameters in which a click would pick them, for scripts.
+    pub fn surface_hints(&self, scale: f32) -> Vec<SurfaceHint> {
+        const PLACES: u32 = 24;
+        let Tool::Patch(session) = &self.tool else { return Vec::new() };
+        if !matches!(session.tool.stage(), Stage::Side(_)) || self.viewport.is_moving() {
+            return Vec::new();
+        }
+        let filter = session.tool.filter().and(self.pickable);
+        let view = self.viewport.view();
+        let mut out = Vec::new();
+        for item in self.viewport.scene.items().iter().filter(|item| item.visible()) {
+            let Geometry::Surface(surface) = &item.geometry else { continue };
+            for k in 0..PLACES * PLACES {
+                let f = [k % PLACES, k / PLACES].map(|i| (f64::from(i) + 0.5) / f64::from(PLACES));
+                let domain = surface.domain();
+                let uv = [0, 1].map(|d| domain[d][0] + f[d] * (domain[d][1] - domain[d][0]));
+                let Some(at) = view.project(surface.eval(DVec2::from_array(uv))) else { continue };
+                let window = self.viewport.to_window(at.pixel);
+                if !self.viewport.rect.shrink(2.0).contains(window) {
+                    continue;
+                }
+                let hit = self.viewport.pick_at(at.pixel, filter);
+                if let Some(Target::Surface { entity, uv: hit }) = hit.map(|h| h.target)
+                    && entity == item.id()
+                    && hit.distance(DVec2::from_array(uv)) < 1e-2 * (domain[0][1] - domain[0][0])
+                {
+                    let (entity, name) = (entity.0, item.entity.name.clone());
+                    out.push(SurfaceHint { entity, name, uv, at: [window.x * scale, window.y * scale] });
+                }
+            }
+        }
+        out
     }
 
     /// One point of every curve that the active tool lets one pick and that a click there would pick, for scripts.

@@ -128,8 +128,11 @@ fn stretch(scene: &Scene, piece: &EdgePiece) -> Vec<DVec3> {
     let at = |t: f64| item.geometry.curve_jet(&piece.curve, t).map(|jet| jet[0]);
     let [from, to] = piece.range;
     let drawn = item.display.as_ref().and_then(|d| d.curves.iter().find(|c| c.curve == piece.curve));
-    let inner = drawn.into_iter().flat_map(|c| c.t.iter().zip(&c.points));
-    let inner = inner.filter(|(t, _)| from < **t && **t < to).map(|(_, p)| *p);
+    let inner: Vec<DVec3> = match drawn {
+        Some(c) => c.t.iter().zip(&c.points).filter(|(t, _)| from < **t && **t < to).map(|(_, p)| *p).collect(),
+        // A crease is not always among the iso-lines that are drawn.
+        None => (1..24).filter_map(|k| at(from + (to - from) * f64::from(k) / 24.0)).collect(),
+    };
     at(from).into_iter().chain(inner).chain(at(to)).collect()
 }
 
