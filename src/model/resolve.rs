@@ -199,7 +199,7 @@ pub fn used(spec: &HealSpec, document: &Document) -> HealSpec {
     HealSpec {
         joining_tol: Some(options.joining_tol),
         tol: Some(options.tol),
-        onto: spec.onto.clone().or_else(|| Some((0..document.surfaces().count()).collect())),
+        onto: spec.onto.clone().or_else(|| Some((0..document.bodies().count()).collect())),
         chord_tol: Some(options.chord_tol),
         ..spec.settings()
     }

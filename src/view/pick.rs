@@ -384,6 +384,12 @@ impl<'a> Cover<'a> {
     }
 }
 
+/// Whether a surface is in front of a point. For many points near one pixel it costs less to ask for all at once.
+pub fn is_hidden(scene: &Scene, view: &View, point: DVec3, options: &PickOptions) -> bool {
+    let Some(at) = view.project(point) else { return true };
+    Cover::new(scene, &Pyramid::new(view, at.pixel, RADIUS, options.section.as_ref()), options).hides(point)
+}
+
 /// The part of a ray that is not cut away.
 fn range(ray: &Ray, options: &PickOptions) -> Option<[f64; 2]> {
     match &options.section {

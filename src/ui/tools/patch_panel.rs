@@ -26,11 +26,11 @@ impl Editor {
     /// Draws the page.
     pub fn patch_panel(&mut self, ui: &mut Ui) {
         let unit = self.document().unit;
-        let surfaces = self.document().surfaces().count();
+        let surfaces = self.document().bodies().count();
         let visible: Vec<usize> = {
             let document = self.document();
             let shown = |id| document.get(id).is_some_and(|e| e.visible);
-            document.surfaces().enumerate().filter(|(_, (id, _))| shown(*id)).map(|(k, _)| k).collect()
+            document.bodies().enumerate().filter(|(_, (id, _))| shown(*id)).map(|(k, _)| k).collect()
         };
         let job = self.jobs.active();
         let Tool::Patch(session) = &mut self.tool else { return };

@@ -60,7 +60,7 @@ impl PatchTool {
         let mut missing = Vec::new();
         self.options.take(settings);
         // All surfaces by number are all surfaces.
-        let count = scene.items().iter().filter(|item| item.kind == ItemKind::Surface).count();
+        let count = scene.items().iter().filter(|item| matches!(item.kind, ItemKind::Surface | ItemKind::Mesh)).count();
         self.options.onto = self.options.onto.take().filter(|list| (0..count).any(|k| !list.contains(&k)));
         for (k, pieces) in spec.sides.iter().enumerate() {
             self.sides[k] = SidePick { boundary: spec.boundary[k], ..SidePick::default() };
