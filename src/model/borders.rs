@@ -65,10 +65,13 @@ pub fn borders(document: &Document, joining: f64) -> Vec<Border> {
     borders_of(document.surfaces().map(|(_, shape)| shape.as_ref()), joining)
 }
 
+/// For each patch, how far its borders are from those of the patches next to it; `None` without any.
+pub type SeamGaps = Vec<(EntityId, Option<f64>)>;
+
 /// How far the borders of each healed patch are from those of other patches that they run along; `None` for a patch
 /// that has no neighbour. Two borders run along each other where they are at most `joining` apart.
-pub fn seam_gaps(document: &Document, joining: f64) -> Vec<(EntityId, Option<f64>)> {
-    let mut gaps: Vec<(EntityId, Option<f64>)> = document.patches().map(|(id, _)| (id, None)).collect();
+pub fn seam_gaps(document: &Document, joining: f64) -> SeamGaps {
+    let mut gaps: SeamGaps = document.patches().map(|(id, _)| (id, None)).collect();
     let found = borders_of(document.patches().map(|(_, patch)| patch.surface.as_ref()), joining);
     for border in found {
         if let Meets::Shared { gap } | Meets::Partly { gap, .. } = border.meets

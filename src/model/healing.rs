@@ -32,7 +32,7 @@ pub enum HealingError {
         /// The patch that is there.
         neighbour: String,
         /// Which rule the two break.
-        source: HealError,
+        source: Box<HealError>,
     },
 }
 
@@ -138,7 +138,7 @@ pub fn with_neighbours(
         together[k] = match share_boundary(&new, input, &options) {
             Ok(shares) => shares,
             Err(source @ HealError::Connect(_)) => {
-                let (patch, neighbour) = (wanted.name.clone(), kept.name.clone());
+                let (patch, neighbour, source) = (wanted.name.clone(), kept.name.clone(), Box::new(source));
                 return Err(HealingError::Neighbour { patch, neighbour, source });
             }
             // What is wrong with one of the two alone is found below, or is of no account.

@@ -14,7 +14,7 @@ use super::settings::{Settings, Theme};
 use super::tools::{PickList, Tool};
 use super::viewport::Viewport;
 use crate::io::autosave::Recovery;
-use crate::model::borders;
+use crate::model::borders::{self, SeamGaps};
 use crate::model::command::Command;
 use crate::model::document::{Document, EntityId, Shape};
 use crate::model::history::History;
@@ -97,7 +97,7 @@ pub struct Editor {
     /// A patch passes when its largest error is within this; by the model's size when not set.
     pub checking: Option<f64>,
     /// How far patches are from those next to them, for one revision of the document.
-    pub seams: Option<(u64, Vec<(EntityId, Option<f64>)>)>,
+    pub seams: Option<(u64, SeamGaps)>,
     /// What crashed sessions left behind.
     pub recoveries: Vec<Recovery>,
     /// Puts changes aside.
@@ -349,7 +349,7 @@ impl Editor {
     }
 
     /// How far each patch is from the patches next to it.
-    pub fn seam_gaps(&mut self) -> Vec<(EntityId, Option<f64>)> {
+    pub fn seam_gaps(&mut self) -> SeamGaps {
         let revision = self.history.revision();
         if self.seams.as_ref().is_none_or(|(of, _)| *of != revision) {
             let document = self.document();

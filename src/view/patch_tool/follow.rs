@@ -72,6 +72,10 @@ impl PatchTool {
         let mut trimmed = 0;
         for (side, at) in cuts {
             let Some(line) = arrange::chain(&self.sides[side].pieces) else { continue };
+            // A crossing on a part that is cut off already is no end any more.
+            if super::piece::nearest_on(&line.points, at).1 > tol {
+                continue;
+            }
             // An end that is there already stays as it is.
             if line.ends().iter().any(|e| e.distance(at) <= tol) {
                 continue;

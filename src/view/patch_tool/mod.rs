@@ -297,6 +297,9 @@ pub struct SidePick {
     pub shared: bool,
 }
 
+/// What a heal depends on: pieces, turned sides with what becomes of them, the loop, corners, options.
+type Signature = (Vec<Vec<Picked>>, [(bool, BoundaryMode); 4], bool, Vec<Chosen>, Options);
+
 /// The tool. See the module's text.
 #[derive(Clone, Debug)]
 pub struct PatchTool {
@@ -530,7 +533,7 @@ impl PatchTool {
     }
 
     /// What the preview depends on, to see whether it changed.
-    fn signature(&self) -> (Vec<Vec<Picked>>, [(bool, BoundaryMode); 4], bool, Vec<Chosen>, Options) {
+    fn signature(&self) -> Signature {
         (
             self.sides.iter().map(|s| s.pieces.clone()).collect(),
             [0, 1, 2, 3].map(|k: usize| (self.sides[k].flipped, self.sides[k].boundary)),

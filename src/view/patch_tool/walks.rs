@@ -535,6 +535,25 @@ fn adjusting_goes_back_to_a_side_and_discarding_keeps_the_sides() {
 }
 
 #[test]
+fn a_crossing_on_a_part_that_was_cut_off_does_not_bring_it_back() {
+    let mut document = Document::new(Unit::Millimetre);
+    let p = |x: f64, y: f64| DVec3::new(x, y, 0.0);
+    // The first curve crosses the second at x = 2 and the third at x = -5; clicked at 5, only 2..10 is meant.
+    for [a, b] in [[p(-10.0, 0.0), p(10.0, 0.0)], [p(2.0, -3.0), p(2.0, 3.0)], [p(-5.0, -3.0), p(-5.0, 3.0)]] {
+        document.add("curve", Shape::Curve(Arc::new(Curve::segment(a, b).unwrap())), None);
+    }
+    let mut w = Walk::new(document);
+    for (k, f) in [(0, 0.75), (1, 0.9), (2, 0.9)] {
+        w.free_curve(k, f);
+        w.key(Key::Enter);
+    }
+    w.key(Key::Trim);
+    let ends = w.tool.sides()[0].pieces[0].ends();
+    assert!(ends.iter().any(|e| e.distance(p(2.0, 0.0)) < 1e-9), "{ends:?}");
+    assert!(ends.iter().any(|e| e.distance(p(10.0, 0.0)) < 1e-9), "{ends:?}");
+}
+
+#[test]
 fn what_a_cancelled_heal_had_can_be_kept_until_something_changes() {
     let mut w = Walk::on_tiles();
     w.pick_hole();
