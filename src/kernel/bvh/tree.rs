@@ -162,7 +162,8 @@ impl SurfaceTree {
         check(&pieces, options)?;
         let matrices = matrices(surface.knots().each_ref().map(Knots::degree));
         let new = |piece| PatchTree::new(piece, options.height, matrices.clone());
-        let patches: Vec<PatchTree> = pieces.par_iter().map(new).collect();
+        let mut patches: Vec<PatchTree> = pieces.par_iter().map(new).collect();
+        patches.shrink_to_fit();
         let grid = surface.knots().each_ref().map(|k| k.breaks().len() - 1);
         let origin = surface.bounds().center();
         let top = top::build(&patches, grid, origin);
