@@ -6,9 +6,12 @@
 mod cases;
 #[path = "support/judge.rs"]
 mod judge;
+#[path = "support/measure.rs"]
+mod measure;
 
 use cases::Case;
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DAffine3, DVec3};
+use measure::distance;
 use patchwright::kernel::geom::{Aabb, Direction, Surface};
 use patchwright::kernel::job::Job;
 use patchwright::kernel::ssi::result::{CurveKind, JunctionKind};
@@ -175,23 +178,6 @@ fn topology_does_not_depend_on_how_the_surfaces_are_written() {
         split.extend(case.surfaces[n_a..].iter().cloned());
         assert_eq!(run(&split, count), wanted, "{name}, split into patches");
     }
-}
-
-/// The distance of a point to a surface near given parameters, by projection steps.
-fn distance(s: &Surface, p: DVec3, start: DVec2) -> f64 {
-    let mut uv = start;
-    for _ in 0..20 {
-        let jet = s.jet(uv, 1);
-        let r = p - jet.p();
-        let (e, f, g) = (jet.u().length_squared(), jet.u().dot(jet.v()), jet.v().length_squared());
-        let det = e * g - f * f;
-        if det <= 0.0 {
-            break;
-        }
-        let (x, y) = (jet.u().dot(r), jet.v().dot(r));
-        uv = s.clamped(uv + DVec2::new(g * x - f * y, e * y - f * x) / det);
-    }
-    s.eval(uv).distance(p)
 }
 
 #[test]

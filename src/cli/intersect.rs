@@ -1,14 +1,15 @@
-//! `patchwright intersect FILE --a 0-3 --b 4-7`: where two sets of surfaces meet.
+//! `patchwright intersect FILE --a 0-3 --b 4-7`: where two sets of bodies meet, or all pairs of a model.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::{CliError, Common, Exit, ProgressLine, ranges};
-use crate::io::{self, SaveOptions};
-use crate::kernel::geom::Curve;
+use crate::io::{self, Format, SaveOptions};
+use crate::kernel::geom::{Curve, Surface};
 use crate::kernel::intersect::{self, intersect_with};
 use crate::kernel::mesh::body::Body;
-use crate::kernel::ssi::Intersection;
+use crate::kernel::ssi::{Intersection, SsiOptions, intersect_all};
 use crate::model::document::{Document, Shape};
+use crate::model::traces::traces_of;
 
 /// Arguments of `intersect`.
 #[derive(Debug, clap::Args)]
@@ -17,11 +18,12 @@ pub struct Args {
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
     /// The bodies of the first side, counted from 0 in file order: `0-3,5`; surfaces first, then meshes and blocks
+    /// [default, without --b: all pairs of surfaces]
     #[arg(long, value_name = "LIST")]
-    pub a: String,
-    /// The bodies of the second side
-    #[arg(long, value_name = "LIST")]
-    pub b: String,
+    pub a: Option<String>,
+    /// The bodies of the second side [default: all that are not in --a]
+    #[arg(long, value_name = "LIST", requires = "a")]
+    pub b: Option<String>,
     /// How: on the exact surfaces (bvh) or on triangulations (mesh)
     /// [default: bvh; mesh where a mesh or block takes part]
     #[arg(long, value_enum)]
@@ -29,7 +31,8 @@ pub struct Args {
     /// How closely curves follow, in model units [default: 1e-6 of the diagonal]
     #[arg(long, value_name = "T")]
     pub tol: Option<f64>,
-    /// Write the curves to this file; its extension says the format
+    /// Write the curves to this file as cubic B-splines, with the surfaces that they run on; IGES also holds the curves
+    /// on these surfaces
     #[arg(long, value_name = "CURVES")]
     pub out: Option<PathBuf>,
 }
@@ -45,44 +48,95 @@ pub enum Engine {
 
 /// Runs `intersect`.
 pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
-    let numbers = |list: &str| ranges::parse(list).map_err(CliError::BadArguments);
-    let (a, b) = (numbers(&args.a)?, numbers(&args.b)?);
     let opened = io::open(&args.file)?;
-    let bodies: Vec<Body> = opened.document.bodies().map(|(_, body)| body).collect();
-    let pick = |list: &[usize]| -> Result<Vec<(usize, Body)>, CliError> {
-        let one = |&n: &usize| match bodies.get(n) {
-            Some(body) => Ok((n, body.clone())),
+    let bodies: Vec<(usize, Body)> = opened.document.bodies().map(|(_, body)| body).enumerate().collect();
+    let pick = |list: &str| -> Result<Vec<(usize, Body)>, CliError> {
+        let one = |n: usize| match bodies.get(n) {
+            Some(body) => Ok(body.clone()),
             None => Err(CliError::BadArguments(format!(
                 "there is no surface {n}: {} has {}, counted from 0",
                 args.file.display(),
                 bodies.len()
             ))),
         };
-        list.iter().map(one).collect()
+        ranges::parse(list).map_err(CliError::BadArguments)?.into_iter().map(one).collect()
     };
-    let (side_a, side_b) = (pick(&a)?, pick(&b)?);
-    let both = || side_a.iter().chain(&side_b).map(|(_, body)| body);
-    let engine = match args.engine {
-        Some(Engine::Bvh) => intersect::Engine::Bvh,
-        Some(Engine::Mesh) => intersect::Engine::Mesh,
-        None => intersect::Engine::for_bodies(both()),
+    let sides = match (&args.a, &args.b) {
+        (Some(a), Some(b)) => Some((pick(a)?, pick(b)?)),
+        (Some(a), None) => {
+            let a = pick(a)?;
+            let rest = bodies.iter().filter(|(n, _)| a.iter().all(|(m, _)| m != n)).cloned().collect();
+            Some((a, rest))
+        }
+        (None, _) => None,
+    };
+    let engine = match (args.engine, &sides) {
+        (Some(Engine::Mesh), None) => {
+            return Err(CliError::BadArguments(
+                "all pairs are found on the exact surfaces; give --a and --b for --engine mesh".into(),
+            ));
+        }
+        (Some(Engine::Bvh), _) | (None, None) => intersect::Engine::Bvh,
+        (Some(Engine::Mesh), _) => intersect::Engine::Mesh,
+        (None, Some((a, b))) => intersect::Engine::for_bodies(a.iter().chain(b).map(|(_, body)| body)),
     };
     let job = super::job();
     let progress = ProgressLine::watch(&job);
-    let result =
-        intersect_with(engine, &side_a, &side_b, args.tol, &job).map_err(|e| CliError::BadArguments(e.to_string()))?;
+    let result = match &sides {
+        Some((a, b)) => {
+            intersect_with(engine, a, b, args.tol, &job).map_err(|e| CliError::BadArguments(e.to_string()))?
+        }
+        None => {
+            let surfaces: Vec<_> = opened.document.surfaces().map(|(_, s)| s).collect();
+            let all: Vec<(usize, &Surface)> = surfaces.iter().map(|s| s.as_ref()).enumerate().collect();
+            if all.len() < bodies.len() {
+                job.warn(format!("{} meshes and blocks are left out of all pairs", bodies.len() - all.len()));
+            }
+            let options = SsiOptions { tol: args.tol, ..SsiOptions::default() };
+            intersect_all(&all, &options, &job).map_err(|e| CliError::BadArguments(e.to_string()))?
+        }
+    };
     drop(progress);
     for warning in job.warnings() {
         common.warn(warning);
     }
     tell(&result, common);
     if let Some(path) = &args.out {
-        let document = curves(&result, &opened.document);
-        let saved = io::save(path, &document, &SaveOptions::default())?;
-        common.say(format!("{} curves written to {}", saved.entities, path.display()));
+        write(path, &result, &opened.document, engine, common)?;
     }
     common.json(&result)?;
     Ok(if result.complete { Exit::Done } else { Exit::Incomplete })
+}
+
+/// Writes B-splines within the tolerance; on triangulations the polylines are the curves.
+fn write(
+    path: &Path,
+    result: &Intersection,
+    model: &Document,
+    engine: intersect::Engine,
+    common: &Common,
+) -> Result<(), CliError> {
+    if engine == intersect::Engine::Mesh {
+        let saved = io::save(path, &curves(result, model), &SaveOptions::default())?;
+        common.say(format!("{} curves written to {}", saved.entities, path.display()));
+        return Ok(());
+    }
+    let fitted = traces_of(result, model, result.tol);
+    for note in &fitted.notes {
+        common.warn(note.clone());
+    }
+    let saved = match Format::of_name(path) {
+        Some(Format::Iges) => io::save_iges(path, &fitted.document, &fitted.traces)?,
+        _ => io::save(path, &fitted.document, &SaveOptions::default())?,
+    };
+    common.say(format!(
+        "{} curves written to {} ({} entities), within {:.1e} of both surfaces",
+        fitted.curves.len(),
+        path.display(),
+        saved.entities,
+        fitted.bound
+    ));
+    Ok(())
 }
 
 fn tell(result: &Intersection, common: &Common) {

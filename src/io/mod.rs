@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use crate::model::document::Document;
 use crate::model::spec::HealSpec;
+use crate::model::traces::SurfaceTrace;
 
 pub(crate) mod atomic;
 pub mod autosave;
@@ -187,14 +188,7 @@ pub fn save_spec(path: &Path, spec: &HealSpec) -> Result<(), SaveError> {
 pub fn save(path: &Path, document: &Document, options: &SaveOptions) -> Result<Saved, SaveError> {
     let unknown = || SaveError::Unknown { path: path.into() };
     match options.format.or_else(|| Format::of_name(path)).ok_or_else(unknown)? {
-        Format::Iges => {
-            let file_name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-            let options = iges::IgesOptions { file_name, time: std::time::SystemTime::now() };
-            let (text, saved) =
-                iges::write(document, &options).map_err(|source| SaveError::Iges { path: path.into(), source })?;
-            atomic::write(path, text.as_bytes())?;
-            Ok(saved)
-        }
+        Format::Iges => save_iges(path, document, &[]),
         format @ (Format::Stl | Format::Obj | Format::Plot3d) => export::save(path, document, format, &options.export),
         format @ Format::Step => Err(SaveError::ReadOnly { format }),
         Format::Project => {
@@ -203,4 +197,14 @@ pub fn save(path: &Path, document: &Document, options: &SaveOptions) -> Result<S
             Ok(Saved { entities: document.entities().len(), ..Saved::default() })
         }
     }
+}
+
+/// Writes a document with curves on its surfaces as an IGES file, in one step.
+pub fn save_iges(path: &Path, document: &Document, traces: &[SurfaceTrace]) -> Result<Saved, SaveError> {
+    let file_name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let options = iges::IgesOptions { file_name, time: std::time::SystemTime::now() };
+    let (text, saved) = iges::write_with_traces(document, traces, &options)
+        .map_err(|source| SaveError::Iges { path: path.into(), source })?;
+    atomic::write(path, text.as_bytes())?;
+    Ok(saved)
 }

@@ -10,3 +10,4 @@ pub mod replay;
 pub mod resolve;
 pub mod selection;
 pub mod spec;
+pub mod traces;

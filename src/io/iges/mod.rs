@@ -18,7 +18,7 @@ mod transform;
 mod uses;
 mod write;
 
-pub use write::{IgesOptions, IgesWriteError, write};
+pub use write::{IgesOptions, IgesWriteError, write, write_with_traces};
 
 use std::collections::HashMap;
 use std::sync::Arc;

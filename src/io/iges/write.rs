@@ -1,4 +1,5 @@
-//! Writing IGES 5.3: surfaces as 128, curves as 126, names as property 406 form 15, colours as 314.
+//! Writing IGES 5.3: surfaces as 128, curves as 126, curves on surfaces as 142, names as property 406 form 15, colours
+//! as 314.
 //!
 //! Numbers are written with the fewest digits that give the same double back (17 at most), so that reading is
 //! bit for bit. For other readers: knots are clamped (exactly refined where the document's are not), weights are
@@ -13,7 +14,8 @@ use glam::DVec3;
 use super::{header, kinds};
 use crate::io::Saved;
 use crate::kernel::geom::{Curve, Knots, Surface};
-use crate::model::document::{Document, Shape};
+use crate::model::document::{Document, EntityId, Shape};
+use crate::model::traces::SurfaceTrace;
 
 /// Why a document cannot be written as IGES.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -41,7 +43,17 @@ pub struct IgesOptions {
 
 /// The text of a document.
 pub fn write(document: &Document, options: &IgesOptions) -> Result<(String, Saved), IgesWriteError> {
+    write_with_traces(document, &[], options)
+}
+
+/// The text of a document and of curves on its surfaces. Traces whose surface is not there are noted and left out.
+pub fn write_with_traces(
+    document: &Document,
+    traces: &[SurfaceTrace],
+    options: &IgesOptions,
+) -> Result<(String, Saved), IgesWriteError> {
     let mut writer = Writer::default();
+    let mut places: HashMap<EntityId, usize> = HashMap::new();
     let mut saved = Saved::default();
     let mut colors: HashMap<[u32; 3], usize> = HashMap::new();
     let left_out = document.meshes().count();
@@ -80,7 +92,22 @@ pub fn write(document: &Document, options: &IgesOptions) -> Result<(String, Save
             record.integer(property);
         }
         let status = if entity.visible { "00000000" } else { "01000000" };
-        writer.add(&record, &Attributes { status, color, form: 0 });
+        places.insert(entity.id, writer.add(&record, &Attributes { status, color, form: 0 }));
+        saved.entities += 1;
+    }
+    for trace in traces {
+        let Some(&surface) = places.get(&trace.surface) else {
+            saved.notes.push("a curve on a surface that is not in the document was left out".to_owned());
+            continue;
+        };
+        // Parts of the curve on the surface; the first is a curve in two parameters.
+        let part = |status| Attributes { status, ..Attributes::default() };
+        let in_surface = writer.add(&curve_record(&trace.in_surface), &part("00010500"));
+        let space = writer.add(&curve_record(&trace.space), &part("00010000"));
+        let mut record = Record::new(142);
+        // Made by intersection; both representations are equally good.
+        [2, surface, in_surface, space, 3].iter().for_each(|&v| record.integer(v));
+        writer.add(&record, &Attributes::default());
         saved.entities += 1;
     }
     let text = writer.finish(document, options)?;

@@ -261,6 +261,16 @@ impl Affine {
     }
 }
 
+/// What was found out about the critical points of a cell.
+enum Critic {
+    /// Everything.
+    Said,
+    /// Nothing.
+    Unknown,
+    /// The fit is not good enough to tell.
+    TooCoarse,
+}
+
 /// How many decimal places beyond a piece's border still belong to it (parameters near tangency are no sharper).
 pub const SLACK: f64 = 1e-7;
 
@@ -299,7 +309,12 @@ impl Contact {
                 continue;
             }
             let size = sub.size.max_element();
-            if self.one_critical(&sub, contact, &mut found) || self.ridge(&sub, contact, &mut found) {
+            match self.one_critical(&sub, contact, &mut found) {
+                Critic::Said => continue,
+                Critic::TooCoarse => return false,
+                Critic::Unknown => {}
+            }
+            if self.ridge(&sub, contact, &mut found) {
                 continue;
             }
             // Only what no derivative tells apart is coincident.
@@ -307,6 +322,10 @@ impl Contact {
                 // A sliver along the border is no area.
                 if outside(1e-6) {
                     continue;
+                }
+                // A gap that drowns in the error of the fit is not known to vanish.
+                if self.error > (0.5 * contact).max(8.0 * ROUNDING) {
+                    return false;
                 }
                 found.coincident.push(self.cell(&sub));
                 continue;
@@ -378,8 +397,8 @@ impl Contact {
         }
     }
 
-    /// Whether the cell holds at most one critical point and everything about it is said.
-    fn one_critical(&self, sub: &Sub, contact: f64, found: &mut Findings) -> bool {
+    /// Says everything about a cell that holds at most one critical point.
+    fn one_critical(&self, sub: &Sub, contact: f64, found: &mut Findings) -> Critic {
         let [xx, xy, yy] = sub.g.hessian_range();
         let slack = 6000.0 * self.error;
         let grown = |r: [f64; 2], w: f64| [r[0] - slack * w, r[1] + slack * w];
@@ -394,7 +413,7 @@ impl Contact {
         let extremum = least > square_most;
         let saddle = most < square_least;
         if !extremum && !saddle {
-            return false;
+            return Critic::Unknown;
         }
         // Newton from the middle; the Hessian is regular everywhere.
         let mut p = DVec2::splat(0.5);
@@ -412,20 +431,24 @@ impl Contact {
                 break None;
             }
             if steps > 40 || !p.is_finite() {
-                return false;
+                return Critic::Unknown;
             }
         };
         // Accept a little outside: the neighbour may see the same point from its own side of the border.
         let margin = 0.01;
         let Some(p) = critical.filter(|p| p.min_element() > -margin && p.max_element() < 1.0 + margin) else {
             self.border_seeds(sub, found);
-            return true;
+            return Critic::Said;
         };
         let gap = sub.g.eval(p.x, p.y).f;
         let place = sub.low + sub.size * p;
         let upward = xx[0] > 0.0;
         if extremum && ((gap > contact + self.error && upward) || (gap < -contact - self.error && !upward)) {
-            return true; // the bowl does not reach the other surface
+            return Critic::Said; // the bowl does not reach the other surface
+        }
+        // A bowl shallower than the fit is good decides about a whole loop.
+        if extremum && gap.abs() <= 2.0 * self.error && self.error > 0.25 * contact {
+            return Critic::TooCoarse;
         }
         let near = gap.abs() <= (4.0 * (contact + self.error)).max(1e-9);
         if near {
@@ -455,7 +478,7 @@ impl Contact {
                 break;
             }
         }
-        true
+        Critic::Said
     }
 
     /// Whether the cell is a valley (or crest) whose floor decides: the second derivative across it keeps its sign.

@@ -21,6 +21,7 @@ use super::piece::Patch;
 use super::region::{self, CoincidentRegion};
 use super::result::{Counts, CurveEnd, Intersection, Times, Unresolved};
 use super::side::{Frame, Side};
+use super::tangency::from_tori;
 use super::trace::{Disc, End, Mode, TraceNode, TraceOptions, Tracer};
 use super::traverse::{ArcPair, Traversal, traverse};
 use super::tree::Tree;
@@ -88,6 +89,32 @@ pub struct Chain {
     pub ends: [ChainEnd; 2],
 }
 
+/// The tolerances of an intersection, in model units.
+pub(super) struct Lengths {
+    pub tol: f64,
+    pub gap: f64,
+    pub joining: f64,
+}
+
+impl SsiOptions {
+    /// What is asked for, or the defaults of a model of this size.
+    pub(super) fn checked(&self, bounds: &Aabb) -> Result<Lengths, SsiError> {
+        let defaults = Tolerances::of(bounds);
+        let diagonal = bounds.diagonal();
+        let checked = |name, value: Option<f64>, default: f64| match value {
+            None => Ok(default),
+            Some(value) if !(value > 0.0 && value.is_finite()) => Err(SsiError::Tolerance { name, value }),
+            Some(value) if value > diagonal && diagonal > 0.0 => Err(SsiError::TooLarge { name, value, diagonal }),
+            Some(value) => Ok(value),
+        };
+        Ok(Lengths {
+            tol: checked("tol", self.tol, defaults.follow)?,
+            gap: checked("gap_tol", self.gap_tol, defaults.gap)?,
+            joining: checked("joining", self.joining, 1e-6 * diagonal.max(f64::MIN_POSITIVE))?,
+        })
+    }
+}
+
 /// Intersects two sets of numbered surfaces.
 pub fn intersect(
     a: &[(usize, &Surface)],
@@ -101,17 +128,8 @@ pub fn intersect(
         }
     }
     let bounds = a.iter().chain(b).fold(Aabb::EMPTY, |all, (_, s)| all.union(&s.bounds()));
-    let defaults = Tolerances::of(&bounds);
     let diagonal = bounds.diagonal();
-    let checked = |name, value: Option<f64>, default: f64| match value {
-        None => Ok(default),
-        Some(value) if !(value > 0.0 && value.is_finite()) => Err(SsiError::Tolerance { name, value }),
-        Some(value) if value > diagonal && diagonal > 0.0 => Err(SsiError::TooLarge { name, value, diagonal }),
-        Some(value) => Ok(value),
-    };
-    let tol = checked("tol", options.tol, defaults.follow)?;
-    let gap_tol = checked("gap_tol", options.gap_tol, defaults.gap)?;
-    let joining = checked("joining", options.joining, 1e-6 * diagonal.max(f64::MIN_POSITIVE))?;
+    let Lengths { tol, gap: gap_tol, joining } = options.checked(&bounds)?;
     let clock = Instant::now();
     let frame = Frame::of(&bounds);
     let sides = [Side::new(a, &frame), Side::new(b, &frame)];
@@ -262,7 +280,9 @@ impl Engine {
         let mut found: Vec<(binormal::Binormal, [usize; 2], bool)> = Vec::new();
         for critical in &findings.criticals {
             let (a, b) = (&self.sides[0].pieces[critical.pa], &self.sides[1].pieces[critical.pb]);
-            let Some(point) = binormal::polish(a, b, critical.at, 0.02, false) else {
+            // From the gap's own critical point, else from the binormals of the osculating tori (thesis 5.3).
+            let polished = binormal::polish(a, b, critical.at, 0.02, false);
+            let Some(point) = polished.or_else(|| from_tori(a, b, critical.at)) else {
                 self.give_up([critical.pa, critical.pb], critical.at, "a point of contact could not be polished");
                 continue;
             };

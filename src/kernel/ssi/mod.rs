@@ -7,23 +7,34 @@
 #![allow(clippy::neg_cmp_op_on_partial_ord)]
 
 mod bernstein;
+pub mod biarc;
 mod binormal;
 mod contact;
 mod correct;
+mod derivative_bounds;
 pub mod engine;
 mod junction;
 mod output;
+pub mod pairs;
 mod piece;
 mod region;
 pub mod result;
 mod side;
+pub mod spline_fit;
+mod strand;
+pub mod tangency;
+pub mod torus_binormal;
 mod trace;
 mod traverse;
 mod tree;
 
+pub use biarc::{Biarcs, fit_biarcs};
 pub use correct::{Condition, Corrected, PointPair, correct};
 pub use engine::{SsiError, SsiOptions, intersect};
+pub use pairs::intersect_all;
 pub use piece::{Jet1, Jet2, Patch, Piece};
 pub use result::Intersection;
 pub use side::{Frame, Place, Side};
+pub use spline_fit::{FitError, SplineFit, fit_splines};
+pub use tangency::{Tangency, TangencyPoint, osculating_torus, tangency};
 pub use trace::{Disc, End, Mode, TraceNode, TraceOptions, Tracer, hermite};

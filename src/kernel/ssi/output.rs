@@ -1,20 +1,91 @@
 //! From traced chains to the result in model units: points dense enough for the tolerance, and an error bound.
+//!
+//! The bound is one of the chords between points, as true as rounding: see [`chord_bound`].
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::correct::{Condition, PointPair};
+use super::derivative_bounds::DerivativeBounds;
 use super::engine::{Chain, Engine};
+use super::piece::{Patch, Piece};
+use super::region::RegionPoint;
 use super::result::{CurveEnd, CurveKind, CurvePoint, Intersection, IntersectionCurve, Junction, JunctionKind, Region};
+use super::side::Side;
 use super::trace::{Mode, TraceNode, Tracer, hermite};
 
-/// The largest number of points between two traced ones.
-const MOST_BETWEEN: usize = 512;
+/// How often the stretch between two traced points is divided again.
+const DEEPEST: usize = 6;
+/// Into how many parts at most, each time.
+const MOST_PARTS: f64 = 64.0;
+
+/// The bounds of the derivatives of pieces, computed when they are first asked for.
+struct Bounds {
+    of: [Vec<Option<DerivativeBounds>>; 2],
+}
+
+impl Bounds {
+    fn get(&mut self, side: usize, index: usize, piece: &Piece) -> DerivativeBounds {
+        *self.of[side][index].get_or_insert_with(|| DerivativeBounds::of(piece))
+    }
+}
+
+/// An upper bound of the distance from the chord between two points to a piece on which both (nearly) lie, at the
+/// parameters `x` and `y`.
+///
+/// Filip's bound for D(t) = chord(t) - S(x(t)) with x(t) = x + (y - x) t + q t (1 - t): |D| is at most that of the ends
+/// plus max |D''| / 8. q takes the tangential part of D'' away, which would measure the parametrization and not the
+/// distance; D'' is evaluated in the middle, and third derivatives bound how it varies.
+fn chord_bound(side: &Side, index: usize, bounds: &DerivativeBounds, ends: [(DVec2, DVec3); 2]) -> f64 {
+    let [(x, p), (y, r)] = ends;
+    let piece = &side.pieces[index];
+    let delta = y - x;
+    let jet = piece.jet2(0.5 * (x + y));
+    let [uu, uv, vv] = jet.second;
+    let bend = uu * (delta.x * delta.x) + uv * (2.0 * delta.x * delta.y) + vv * (delta.y * delta.y);
+    let (e, f, g) = (jet.u.length_squared(), jet.u.dot(jet.v), jet.v.length_squared());
+    let det = e * g - f * f;
+    let q = if det > 1e-12 * e * g {
+        let (bu, bv) = (bend.dot(jet.u), bend.dot(jet.v));
+        0.5 * DVec2::new((g * bu - f * bv) / det, (e * bv - f * bu) / det)
+    } else {
+        DVec2::ZERO
+    };
+    let q = if q.length() <= delta.length() { q } else { DVec2::ZERO };
+    let middle = (bend - (jet.u * q.x + jet.v * q.y) * 2.0).length();
+    let (dq, w) = (q.abs(), delta.abs() + q.abs());
+    let away = 0.5 * delta.abs() + 0.25 * dq;
+    let varies = 0.5 * bounds.third(w) + 2.0 * bounds.second(dq, w) + 2.0 * bounds.second(away, dq);
+    // x(t) may leave the piece where it runs along a border.
+    let inside = x.min(y).min(DVec2::ONE - x.max(y)).max(DVec2::ZERO);
+    let beyond = (0.25 * dq - inside).max(DVec2::ZERO);
+    let mut leaves = 0.0;
+    if beyond != DVec2::ZERO {
+        leaves = bounds.first(beyond);
+        // Beyond an inner border the next piece goes on; where both have one tangent plane it is as near.
+        let fixed = usize::from(beyond.y > beyond.x);
+        let value = if x[fixed] + y[fixed] > 1.0 { 1.0 } else { 0.0 };
+        if let Some(next) = side.neighbour(index, fixed, value).filter(|_| beyond[1 - fixed] == 0.0) {
+            let mut at = 0.5 * (x + y);
+            at[fixed] = 1.0 - value;
+            let n = side.pieces[next].jet1(at).cross().normalize_or_zero();
+            let across = if fixed == 0 { jet.u } else { jet.v };
+            if n != DVec3::ZERO {
+                leaves = beyond[fixed] * across.dot(n).abs() + 2.0 * bounds.second(beyond, beyond + w);
+            }
+        }
+    }
+    let own = piece.point(x).distance(p).max(piece.point(y).distance(r));
+    own + (middle + varies) / 8.0 + leaves
+}
 
 /// Everything in model units.
 pub fn assemble(engine: &Engine, tol: f64) -> Intersection {
     let tracer = Tracer { sides: [&engine.sides[0], &engine.sides[1]], options: engine.trace, discs: &[] };
+    let none = |side: usize| vec![None; engine.sides[side].pieces.len()];
+    let mut bounds = Bounds { of: [none(0), none(1)] };
+    let long = engine.chains.iter().filter(|c| c.nodes.len() > 1);
     let mut curves: Vec<IntersectionCurve> =
-        engine.chains.iter().filter(|c| c.nodes.len() > 1).map(|chain| curve(engine, &tracer, chain, tol)).collect();
+        long.map(|chain| curve(engine, &tracer, &mut bounds, chain, tol)).collect();
     let junctions = engine
         .contacts
         .iter()
@@ -44,14 +115,13 @@ pub fn assemble(engine: &Engine, tol: f64) -> Intersection {
         let boundary: Vec<Vec<CurvePoint>> =
             region.loops.iter().map(|l| l.iter().map(|q| super::region::point_of(engine, q)).collect()).collect();
         let max_distance = region.distance / engine.frame.scale;
-        for points in &boundary {
+        for (points, line) in boundary.iter().zip(&region.loops) {
             curves.push(IntersectionCurve {
                 kind: CurveKind::CoincidentBoundary,
                 closed: true,
                 ends: [CurveEnd::Loop; 2],
                 end_ids: [None; 2],
-                // The polylines were sampled to this sag.
-                error_bound: max_distance + tol,
+                error_bound: boundary_bound(engine, &mut bounds, line) / engine.frame.scale + rounding(points),
                 region: Some(k),
                 points: points.clone(),
             });
@@ -78,11 +148,11 @@ pub fn point_of(engine: &Engine, node: &TraceNode) -> CurvePoint {
     CurvePoint { xyz: engine.frame.to_model(p), a: a.surface, uv: a.to_surface(uv), b: b.surface, st: b.to_surface(st) }
 }
 
-fn curve(engine: &Engine, tracer: &Tracer<'_>, chain: &Chain, tol: f64) -> IntersectionCurve {
-    let wanted = 0.7 * tol * engine.frame.scale;
+fn curve(engine: &Engine, tracer: &Tracer<'_>, bounds: &mut Bounds, chain: &Chain, tol: f64) -> IntersectionCurve {
+    let wanted = 0.9 * tol * engine.frame.scale;
     let mut bound: f64 = 0.0;
     let mut points: Vec<CurvePoint> = Vec::with_capacity(chain.nodes.len() * 2);
-    let push = |points: &mut Vec<CurvePoint>, node: &TraceNode| {
+    let mut push = |node: &TraceNode| {
         let point = point_of(engine, node);
         let repeated = points.last().is_some_and(|last: &CurvePoint| {
             last.a == point.a && last.b == point.b && last.uv == point.uv && last.st == point.st
@@ -92,25 +162,34 @@ fn curve(engine: &Engine, tracer: &Tracer<'_>, chain: &Chain, tol: f64) -> Inter
         }
     };
     for (k, from) in chain.nodes.iter().enumerate() {
-        push(&mut points, from);
+        push(from);
+        let Some(to) = chain.nodes.get(k + 1) else { break };
+        if !to.same_pair(from) {
+            bound = bound.max(from.p.distance(to.p));
+            continue;
+        }
         let (a, b) = (&engine.sides[0].pieces[from.pa], &engine.sides[1].pieces[from.pb]);
-        bound = bound.max(a.point(from.at.uv).distance(b.point(from.at.st)));
-        let Some(to) = chain.nodes.get(k + 1).filter(|to| to.same_pair(from)) else { continue };
+        let own = [bounds.get(0, from.pa, a), bounds.get(1, from.pb, b)];
         let off = |x: &TraceNode, y: &TraceNode| {
-            let at = hermite(x, y, 0.5);
-            let middle = 0.5 * (x.p + y.p);
-            a.point(at.uv).distance(middle).max(b.point(at.st).distance(middle))
+            let on_a = chord_bound(&engine.sides[0], from.pa, &own[0], [(x.at.uv, x.p), (y.at.uv, y.p)]);
+            on_a.max(chord_bound(&engine.sides[1], from.pb, &own[1], [(x.at.st, x.p), (y.at.st, y.p)]))
         };
-        let sag = off(from, to);
-        let parts = ((sag / wanted).sqrt().ceil() as usize).clamp(1, MOST_BETWEEN);
-        let mut last = *from;
-        for j in 1..=parts {
-            let next = if j == parts { *to } else { between(tracer, chain.mode, from, to, j as f64 / parts as f64) };
-            bound = bound.max(1.2 * off(&last, &next));
-            if j < parts {
-                push(&mut points, &next);
+        let mut stack = vec![(*from, *to, 0)];
+        while let Some((x, y, depth)) = stack.pop() {
+            let here = off(&x, &y);
+            if here <= wanted || depth == DEEPEST || x.p.distance(y.p) < 1e-9 {
+                bound = bound.max(here);
+                push(&y);
+                continue;
             }
-            last = next;
+            let parts = (here / (0.8 * wanted)).sqrt().ceil().clamp(2.0, MOST_PARTS);
+            let mut last = y;
+            for j in (1..parts as usize).rev() {
+                let next = between(tracer, chain.mode, &x, &y, j as f64 / parts);
+                stack.push((next, last, depth + 1));
+                last = next;
+            }
+            stack.push((x, last, depth + 1));
         }
     }
     let [start, end] = chain.ends;
@@ -124,11 +203,34 @@ fn curve(engine: &Engine, tracer: &Tracer<'_>, chain: &Chain, tol: f64) -> Inter
         closed,
         ends: [start.end, end.end],
         end_ids: [start.contact, end.contact],
-        error_bound: bound / engine.frame.scale
-            + 16.0 * f64::EPSILON * points.iter().fold(0.0, |m: f64, p| m.max(p.xyz.abs().max_element())),
+        error_bound: bound / engine.frame.scale + rounding(&points),
         region: None,
         points,
     }
+}
+
+/// What rounding does to points in model units.
+fn rounding(points: &[CurvePoint]) -> f64 {
+    16.0 * f64::EPSILON * points.iter().fold(0.0, |m: f64, p| m.max(p.xyz.abs().max_element()))
+}
+
+/// An upper bound of the distance of a region's boundary to both sides, in the unit frame.
+fn boundary_bound(engine: &Engine, bounds: &mut Bounds, line: &[RegionPoint]) -> f64 {
+    let mut step = |w: &[RegionPoint]| {
+        let (x, y) = (&w[0], &w[1]);
+        let places = [[x.a, y.a], [x.b, y.b]];
+        if places.iter().any(|[x, y]| x.piece != y.piece) {
+            return x.p.distance(y.p);
+        }
+        let mut on = |side: usize| {
+            let [from, to] = places[side];
+            let piece = &engine.sides[side].pieces[from.piece];
+            let own = bounds.get(side, from.piece, piece);
+            chord_bound(&engine.sides[side], from.piece, &own, [(from.uv, x.p), (to.uv, y.p)])
+        };
+        [on(0), on(1)].into_iter().fold(0.0, f64::max)
+    };
+    line.windows(2).map(&mut step).fold(0.0, f64::max)
 }
 
 /// A corrected point between two traced ones; the interpolated one where correction fails (near a junction).

@@ -108,6 +108,15 @@ impl Piece {
         self.jet1(uv).p
     }
 
+    /// Whether it is a point or a curve: nowhere on a grid do its derivatives span a plane.
+    pub fn has_no_area(&self) -> bool {
+        let at = |k: u32| f64::from(k) / 6.0 + 0.01 * f64::from(k % 2);
+        (0..49).all(|k| {
+            let jet = self.jet1(DVec2::new(at(k % 7), at(k / 7)));
+            !(jet.cross().length() > 1e-10 * jet.u.length() * jet.v.length())
+        })
+    }
+
     /// Sums of the net against values and derivatives of the Bernstein polynomials; `K` is one more than the
     /// largest degree, `D` one more than the derivative order.
     fn sums<const K: usize, const D: usize>(&self, uv: DVec2) -> [[DVec4; D]; D] {

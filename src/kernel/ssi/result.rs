@@ -210,6 +210,7 @@ impl Intersection {
     pub fn append(&mut self, other: Self) {
         let (junctions, miters, regions) = (self.junctions.len(), self.miters.len(), self.regions.len());
         self.complete &= other.complete;
+        self.tol = self.tol.max(other.tol);
         self.curves.extend(other.curves.into_iter().map(|mut curve| {
             for (end, id) in curve.ends.iter().zip(&mut curve.end_ids) {
                 let shift = if *end == CurveEnd::Miter { miters } else { junctions };

@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use glam::DVec3;
+
 use super::contact::{self, Contact, Findings};
 use super::side::Side;
 use super::tree::{Tree, Verdict, judge};
@@ -53,6 +55,11 @@ pub fn traverse(sides: [&Side; 2], trees: &mut [Tree; 2], gap: f64, job: &Job) -
     let starts = root_pairs(trees, gap);
     let total = starts.len().max(1);
     for (k, start) in starts.into_iter().enumerate() {
+        let pieces = [&trees[0].nodes[start.0], &trees[1].nodes[start.1]];
+        if (0..2).all(|side| pieces[side].n == DVec3::ZERO && sides[side].pieces[pieces[side].piece].has_no_area()) {
+            out.unresolved.push((start.0, start.1, "both patches are degenerate: points or curves, without area"));
+            continue;
+        }
         let mut stack = vec![start];
         while let Some((ia, ib)) = stack.pop() {
             out.judged += 1;
