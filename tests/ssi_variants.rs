@@ -16,10 +16,10 @@ use patchwright::kernel::job::Job;
 use patchwright::kernel::ssi::result::{CurveEnd, CurveKind, JunctionKind};
 use patchwright::kernel::ssi::{Intersection, SsiOptions, intersect};
 
-pub struct Random(u64);
+struct Random(u64);
 
 impl Random {
-    pub fn new(seed: u64) -> Self {
+    fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(0x1234_5678_9abc_def1))
     }
 
@@ -140,7 +140,7 @@ fn moved(list: &[Surface], map: &DAffine3) -> Vec<Surface> {
 }
 
 /// A bicubic B-spline graph of `n` x `n` spans over [low, high]^2 with random heights.
-pub fn spline_graph(random: &mut Random, n: usize, low: f64, high: f64, height: f64) -> Surface {
+fn spline_graph(random: &mut Random, n: usize, low: f64, high: f64, height: f64) -> Surface {
     let breaks: Vec<f64> = (0..=n).map(|k| low + (high - low) * k as f64 / n as f64).collect();
     let knots = Knots::clamped(3, &breaks, 1).unwrap();
     let at = knots.greville();
