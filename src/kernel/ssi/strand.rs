@@ -141,7 +141,7 @@ impl Ground {
             t = next_t;
         }
         self.give_directions(&mut strands, curve.closed);
-        let cut = strands.into_iter().flat_map(|s| at_corners(s)).collect();
+        let cut = strands.into_iter().flat_map(at_corners).collect();
         Some(cut)
     }
 
