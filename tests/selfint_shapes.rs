@@ -9,7 +9,7 @@ mod shapes;
 use std::time::Instant;
 
 use glam::{DVec2, DVec3};
-use patchwright::kernel::geom::{Knots, Surface};
+use patchwright::kernel::geom::{Direction, Knots, Surface};
 use patchwright::kernel::job::Job;
 use patchwright::kernel::self_ssi::{SelfIntersectOptions, SelfIntersection, self_intersect};
 use patchwright::kernel::ssi::result::{CurveEnd, CurveKind, IntersectionCurve};
@@ -396,5 +396,17 @@ fn three_sheets_meet_in_a_triple_point() {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn the_continuation_of_a_neighbouring_piece_is_no_coincident_region() {
+    // Split at a knot without changing the surface, a piece continues as its neighbour: exactly, but as the same points.
+    let surface = interpolate(&square(), &square(), ridge(|x| 0.0025 - x * x));
+    for (u, v) in [(0.004, 0.027), (-0.038, -0.003), (0.02, -0.02), (-0.014, 0.09)] {
+        let split = surface.knot_inserted(Direction::U, u, 1).unwrap().knot_inserted(Direction::V, v, 1).unwrap();
+        let found = solve("split", &split);
+        assert!(found.result.complete && found.result.regions.is_empty(), "{u} {v}");
+        assert_eq!((curves(&found).len(), found.result.miters.len()), (2, 2));
     }
 }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::{CliError, Common, Exit, ProgressLine};
 use crate::kernel::self_ssi::SelfIntersectOptions;
 use crate::kernel::self_ssi::model::{merged, self_intersect_all};
-use crate::kernel::ssi::result::CurveEnd;
+use crate::kernel::ssi::result::{CurveEnd, CurveKind, Intersection};
 
 /// Arguments of `self-intersect`.
 #[derive(Debug, clap::Args)]
@@ -46,24 +46,7 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
     for warning in job.warnings() {
         common.warn(warning);
     }
-    common.say(format!(
-        "{} self-intersection curves, {} miter points, {} coincident regions, {} unresolved",
-        all.curves.len(),
-        all.miters.len(),
-        all.regions.len(),
-        all.unresolved.len()
-    ));
-    for curve in &all.curves {
-        let name = |end: CurveEnd| format!("{end:?}").to_lowercase();
-        let surface = curve.points.first().map_or(0, |p| p.a);
-        common.say(format!(
-            "  surface {surface}: {} points, {} to {}, within {:.1e}",
-            curve.points.len(),
-            name(curve.ends[0]),
-            name(curve.ends[1]),
-            curve.error_bound
-        ));
-    }
+    tell(&all, common);
     common.json(&all)?;
     Ok(if job.is_cancelled() {
         Exit::Cancelled
@@ -72,4 +55,44 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
     } else {
         Exit::Incomplete
     })
+}
+
+fn tell(all: &Intersection, common: &Common) {
+    common.say(format!(
+        "{} self-intersection curves, {} miter points, {} triple points, {} coincident regions, {} unresolved",
+        all.curves.iter().filter(|c| c.kind == CurveKind::SelfIntersection).count(),
+        all.miters.len(),
+        all.junctions.len(),
+        all.regions.len(),
+        all.unresolved.len()
+    ));
+    for curve in &all.curves {
+        let name = |end: CurveEnd| format!("{end:?}").to_lowercase();
+        let kind = match curve.kind {
+            CurveKind::CuspEdge => "cusp edge, ",
+            CurveKind::CoincidentBoundary => "border of a coincident region, ",
+            _ => "",
+        };
+        let surface = curve.points.first().map_or(0, |p| p.a);
+        common.say(format!(
+            "  surface {surface}: {kind}{} points, {} to {}, within {:.1e}",
+            curve.points.len(),
+            name(curve.ends[0]),
+            name(curve.ends[1]),
+            curve.error_bound
+        ));
+    }
+    for miter in &all.miters {
+        let isolated = if miter.isolated { ", isolated" } else { "" };
+        common.say(format!("  surface {}: miter point at {}, parameters {}{isolated}", miter.a, miter.xyz, miter.uv));
+    }
+    for junction in &all.junctions {
+        common.say(format!("  surface {}: triple point at {}", junction.a, junction.xyz));
+    }
+    for place in &all.unresolved {
+        common.warn(format!(
+            "unresolved: surface {} over {:?} with itself over {:?}: {}",
+            place.a, place.uv_box, place.st_box, place.reason
+        ));
+    }
 }

@@ -13,7 +13,7 @@ use glam::{DVec2, DVec3};
 
 use super::cusp::{CuspEdge, CuspWindow, cusp_window};
 use super::hull::{Hull, Rect, range};
-use super::march::Pace;
+use super::march::{Pace, turns};
 use super::miter::{MiterKind, MiterPoint};
 use super::pair_test::{Verdict, examine};
 use super::record::{FailedWindow, NodeRole, NodeState, Record, TernaryNode, unsettled};
@@ -478,7 +478,8 @@ impl<'a> Search<'a> {
     }
 
     /// Whether two boxes coincide over an area: `None` when they do not, otherwise whether points of one have their
-    /// partners in the other.
+    /// partners in the other. A piece that continues as its neighbour meets the same points, not others: seen in the
+    /// middle, since on a seam both are one point anyway.
     fn coincide(&self, a: &Rect, pa: usize, b: &Rect, pb: usize) -> Option<bool> {
         let gap = 1e-11_f64.max(4.0 * self.sheet.rounding);
         let mut met = false;
@@ -488,7 +489,7 @@ impl<'a> Search<'a> {
             let (q, distance) = foot(self.sheet, pb, b.center(), s)?;
             if distance > gap
                 || !b.grown(1.5).contains(q)
-                || (pa == pb && p.distance(q) < 1e-3 * a.size().max_element())
+                || (k == 4 && (p - q - turns(self.sheet, p, q)).length() < 1e-3 * a.size().max_element())
             {
                 return None;
             }

@@ -117,7 +117,7 @@ fn area(sheet: &Sheet, group: &[Coincidence], folds: &[(usize, Rect)], edges: &[
                 .filter(|c| c.a.grown(1e-9).contains(p))
                 .filter_map(|c| foot(sheet, sheet.piece_at(c.b.center()), c.b.center(), s))
                 .min_by(|x, y| x.1.total_cmp(&y.1));
-            if let Some((q, distance)) = partner {
+            if let Some((q, distance)) = partner.filter(|found| found.1 <= 1e-9) {
                 result.distance = result.distance.max(distance);
                 matched.push([p, q]);
             }
