@@ -456,6 +456,43 @@ fn the_uv_view_and_the_3d_view_share_one_cursor() {
 }
 
 #[test]
+fn inspecting_looks_into_a_hierarchy_in_both_views() {
+    let mut window = opened("surfaces_with_gap.igs");
+    window.get_by_label("right panel").click();
+    settle(&mut window);
+    key(&mut window, Modifiers::NONE, Key::I);
+    assert!(prompt(&window).starts_with("Inspect · Level 1"), "{}", prompt(&window));
+    key(&mut window, Modifiers::NONE, Key::Num2);
+    assert!(prompt(&window).starts_with("Inspect · Level 2"), "a digit is a level: {}", prompt(&window));
+    // The uv view shows the level; a click there pins the node under it, which the panel describes.
+    let pane = window.get_by_label_contains("uv view of right panel · level 2").rect();
+    hover(&mut window, pane.center() + egui::vec2(31.0, 17.0));
+    assert!(window.query_by_label("Swept radius").is_some());
+    click(&mut window, pane.center() + egui::vec2(31.0, 17.0));
+    hover(&mut window, pos2(4.0, 4.0));
+    assert!(window.query_by_label("Pinned node").is_some());
+    let linked = window.state().editor.linked;
+    assert!(linked.is_none(), "{linked:?}");
+    // Tori, boxes, ghosts: everything is drawn without complaint.
+    for k in [Key::T, Key::V, Key::V, Key::G, Key::Num3] {
+        key(&mut window, Modifiers::NONE, k);
+        assert!(prompt(&window).starts_with("Inspect"), "{}", prompt(&window));
+    }
+    // A second surface: the overlapping nodes.
+    window.get_by_label("left panel").click_modifiers(Modifiers::COMMAND);
+    settle(&mut window);
+    assert_eq!(window.state().editor.selection.ids().len(), 2);
+    window.get_by_label("Overlapping pairs only").click();
+    settle(&mut window);
+    assert!(window.query_by_label_contains("overlapping pairs at level 3").is_some());
+    key(&mut window, Modifiers::NONE, Key::Escape);
+    if prompt(&window).starts_with("Inspect") {
+        key(&mut window, Modifiers::NONE, Key::Escape);
+    }
+    assert!(prompt(&window).starts_with("Select"), "{}", prompt(&window));
+}
+
+#[test]
 fn a_file_that_cannot_be_read_is_explained_and_the_model_stays() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("broken.igs");

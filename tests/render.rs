@@ -11,8 +11,9 @@ use image::{Rgba, RgbaImage};
 use patchwright::render::{
     CameraData, Color, ColorScale, Dash, Display, Emphasis, Field, FrameData, FrameStats, GlyphData, GlyphItem,
     GlyphShape, Gpu, Hidden, Key, LineData, LineItem, LineRole, LineStyle, MeshData, MeshItem, Offscreen, Renderer,
-    Section, Viewport, srgb, to_srgb8,
+    Section, Viewport, VolumeData, VolumeForm, VolumeItem, srgb, to_srgb8,
 };
+use patchwright::view::rounded_box::RoundedBox;
 
 /// One GPU for all tests of this file: software drivers compile pipelines slowly.
 static SHARED: Mutex<Option<Offscreen>> = Mutex::new(None);
@@ -564,4 +565,69 @@ fn emphases_strokes_and_glyphs_are_told_apart() {
     assert!(luma(sphere(0)) > luma(sphere(1)) + 15, "muted is paler on a pale ground");
     assert!(luma(sphere(2)) > luma(sphere(1)) + 15, "hovered is brighter");
     assert!(warmth(sphere(3)) > warmth(sphere(1)) + 40, "selected takes the accent");
+}
+
+fn volumes(list: Vec<RoundedBox>, form: VolumeForm) -> VolumeItem {
+    let colors = vec![[30, 60, 120, 255]; list.len()];
+    let data = VolumeData { origin: DVec3::ZERO, volumes: Arc::new(list), colors };
+    VolumeItem { key: Key::new(1, 0), revision: fresh(), volumes: Arc::new(data), form, opacity: 0.9, sectioned: true }
+}
+
+#[test]
+fn swept_volumes_cover_what_steiner_says() {
+    let turned = |degrees: f64| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        [DVec3::new(cos, sin, 0.0), DVec3::new(-sin, cos, 0.0)]
+    };
+    // Seen from above: area of the box, its edges times the radius, the corners' disc.
+    for (half, radius) in [
+        (DVec3::ZERO, 1.2),
+        (DVec3::new(1.0, 0.0, 0.0), 0.5),
+        (DVec3::new(1.2, 0.7, 0.0), 0.4),
+        (DVec3::new(1.2, 0.7, 0.9), 0.0),
+    ] {
+        let volume = RoundedBox { center: DVec3::new(0.1, -0.2, 0.3), axes: turned(27.0), half, radius };
+        let area = 4.0 * half.x * half.y + 4.0 * (half.x + half.y) * radius + std::f64::consts::PI * radius * radius;
+        for form in [VolumeForm::Solid, VolumeForm::Outline { width: 1.0, fill: 1.0 }] {
+            let mut frame = plan_view([500, 500]);
+            frame.volumes.push(volumes(vec![volume], form));
+            let Some(picture) = render("volume_area", &frame) else { return };
+            let covered = picture.pixels().filter(|p| !is_background(p)).count() as f64 / 1e4;
+            assert!((covered - area).abs() < 0.02 * area, "{half} {radius} {form:?}: {covered} instead of {area}");
+        }
+    }
+}
+
+#[test]
+fn an_outline_is_hollow_and_stays_thin_at_any_size() {
+    for radius in [0.2, 1.0, 2.2] {
+        let volume = RoundedBox { center: DVec3::ZERO, axes: [DVec3::X, DVec3::Y], half: DVec3::ZERO, radius };
+        let mut frame = plan_view([500, 500]);
+        frame.volumes.push(volumes(vec![volume], VolumeForm::Outline { width: 2.0, fill: 0.0 }));
+        let Some(picture) = render("volume_outline", &frame) else { return };
+        let covered = picture.pixels().filter(|p| !is_background(p)).count() as f64;
+        // A ring two pixels wide, with soft rims.
+        let ring = std::f64::consts::TAU * radius * 100.0;
+        assert!(covered > 1.5 * ring && covered < 4.5 * ring, "{radius}: {covered} pixels on {ring}");
+    }
+}
+
+#[test]
+fn volumes_out_of_the_picture_are_not_sent() {
+    let at = |x: f64| RoundedBox {
+        center: DVec3::new(x, 0.0, 0.0),
+        axes: [DVec3::X, DVec3::Y],
+        half: DVec3::new(0.01, 0.01, 0.0),
+        radius: 0.001,
+    };
+    // A strip of sixteen runs, of which the picture shows the first few.
+    let list: Vec<RoundedBox> = (0..16 * 1024).map(|k| at(f64::from(k) * 40.0 / 16384.0)).collect();
+    let mut frame = plan_view([500, 500]);
+    frame.volumes.push(volumes(list, VolumeForm::Outline { width: 1.0, fill: 0.2 }));
+    let Some(mut shared) = offscreen("volume_culling") else { return };
+    let offscreen = shared.as_mut().unwrap();
+    offscreen.render(&Arc::new(frame)).unwrap();
+    let stats = offscreen.stats();
+    assert_eq!(stats.volumes_total, 16 * 1024);
+    assert!(stats.volumes >= 1024 && stats.volumes <= 3 * 1024, "{stats:?}");
 }

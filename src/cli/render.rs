@@ -8,6 +8,7 @@ use clap::ValueEnum;
 use glam::DVec2;
 use serde::Serialize;
 
+use self::layers::{LevelReport, Show};
 use super::{CliError, Common, Exit};
 use crate::kernel::geom::Aabb;
 use crate::kernel::mesh::surface_set::SurfaceSet;
@@ -18,6 +19,8 @@ use crate::view::deviation::deviation;
 use crate::view::scene::{ItemKind, Scene};
 use crate::view::viewport::{View, Viewport};
 
+mod layers;
+
 /// How finely originals are tessellated to measure deviations, as a fraction of the diagonal; closest points are exact
 /// whatever this is.
 const MEASURE: f64 = 1e-4;
@@ -25,27 +28,6 @@ const MEASURE: f64 = 1e-4;
 const MARGIN: f64 = 0.86;
 /// Distances beyond this fraction of the diagonal are no deviations.
 const FAR: f64 = 0.05;
-
-/// What is drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Show {
-    /// Filled, lit surfaces
-    Shaded,
-    /// Edges of surfaces
-    Edges,
-    /// Iso-lines of surfaces
-    Isolines,
-    /// Edges and iso-lines only, nothing hidden
-    Wireframe,
-    /// Translucent surfaces
-    Xray,
-    /// Zebra stripes
-    Zebra,
-    /// Every surface in a colour of its own
-    Patches,
-    /// Distance of the healed patches from the surfaces, in colour
-    Deviation,
-}
 
 /// From where.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -79,8 +61,10 @@ pub struct Args {
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", default_value = "1600x1000", value_parser = size)]
     pub size: [u32; 2],
-    /// What is drawn, all of it listed
-    #[arg(long, value_delimiter = ',', default_value = "shaded,edges")]
+    /// What is drawn, all of it listed: shaded, edges, isolines, wireframe, xray, zebra, patches, deviation; bvh:N is
+    /// level N of the hierarchies as rectangle-swept spheres, spheres:N and boxes:N as those, each coloured by error or
+    /// by :level or :cone after it; tori:N is the leaf tori of height N
+    #[arg(long, value_delimiter = ',', default_value = "shaded,edges", value_parser = layers::show)]
     pub show: Vec<Show>,
     /// From where
     #[arg(long, default_value = "iso")]
@@ -133,6 +117,7 @@ struct Report {
     adapter: String,
     triangles: usize,
     segments: usize,
+    levels: Vec<LevelReport>,
     deviation: Option<DeviationReport>,
 }
 
@@ -161,7 +146,10 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
     let bare = shows(Show::Wireframe) || shows(Show::Xray);
     let look = Look {
         display: Display {
-            shaded: shows(Show::Shaded) || shows(Show::Deviation) || (shows(Show::Patches) && !bare),
+            shaded: shows(Show::Shaded)
+                || args.show.iter().any(|s| matches!(s, Show::Tori(_)))
+                || shows(Show::Deviation)
+                || (shows(Show::Patches) && !bare),
             edges: shows(Show::Edges),
             isolines: shows(Show::Isolines),
             wireframe: shows(Show::Wireframe),
@@ -188,6 +176,8 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         }
     }
 
+    let levels = layers::add(&mut frame, &scene, &args.show, &super::job())?;
+
     let mut offscreen = Offscreen::new(gpu);
     let picture = offscreen.render(&Arc::new(frame))?;
     save(&picture, &args.out)?;
@@ -201,8 +191,26 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
             d.max, d.rms, d.measured, d.no_data, -d.range, d.range, d.tol
         ));
     }
+    for level in &levels {
+        common.say(format!(
+            "level {}: {} nodes; viridis from {:.3e} to {:.3e}{} is {}",
+            level.level,
+            level.nodes,
+            level.low,
+            level.high,
+            if level.logarithmic { " (logarithmic)" } else { "" },
+            level.colors
+        ));
+    }
     let adapter = offscreen.gpu().name.clone();
-    common.json(&Report { size: args.size, adapter, triangles, segments, deviation: measured.map(|(_, d)| d) })?;
+    common.json(&Report {
+        size: args.size,
+        adapter,
+        triangles,
+        segments,
+        levels,
+        deviation: measured.map(|(_, d)| d),
+    })?;
     Ok(Exit::Done)
 }
 

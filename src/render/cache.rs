@@ -10,7 +10,8 @@ use bytemuck::{Pod, Zeroable};
 use wgpu::util::DeviceExt;
 
 use super::cull::Bounds;
-use super::frame::{Field, GlyphData, GlyphItem, Key, LineData, LineItem, MeshData, MeshItem};
+use super::frame::{Field, GlyphData, GlyphItem, Key, LineData, LineItem, MeshData, MeshItem, VolumeItem};
+use super::volume::GpuVolumes;
 
 /// Triangles in one culled run.
 const RUN: usize = 4096;
@@ -118,6 +119,7 @@ pub(super) struct Cache {
     fields: Table<wgpu::Buffer>,
     lines: Table<GpuLines>,
     glyphs: Table<GpuGlyphs>,
+    volumes: Table<GpuVolumes>,
     now: u64,
     /// Buffers rebuilt since the frame began.
     pub rebuilt: usize,
@@ -133,6 +135,7 @@ impl Cache {
             self.fields.sweep(self.now);
             self.lines.sweep(self.now);
             self.glyphs.sweep(self.now);
+            self.volumes.sweep(self.now);
         }
     }
 
@@ -157,6 +160,11 @@ impl Cache {
         self.rebuilt += self.glyphs.update(item.key, item.revision, self.now, build) as usize;
     }
 
+    pub fn update_volumes(&mut self, device: &wgpu::Device, item: &VolumeItem) {
+        let build = || GpuVolumes::new(device, &item.volumes);
+        self.rebuilt += self.volumes.update(item.key, item.revision, self.now, build) as usize;
+    }
+
     pub fn mesh(&self, key: Key) -> Option<&GpuMesh> {
         self.meshes.get(key)
     }
@@ -167,6 +175,10 @@ impl Cache {
 
     pub fn lines(&self, key: Key) -> Option<&GpuLines> {
         self.lines.get(key)
+    }
+
+    pub fn volumes(&self, key: Key) -> Option<&GpuVolumes> {
+        self.volumes.get(key)
     }
 
     pub fn glyphs(&self, key: Key) -> Option<&GpuGlyphs> {

@@ -1,7 +1,8 @@
 //! From a frame to draw calls: culling, uniforms, and the order of passes.
 //!
-//! Order: backdrop; opaque surfaces; hidden then visible parts of lines; translucent surfaces from far to near; hidden
-//! then visible glyphs; everything on top. Lines and glyphs write no depth, so later items lie over earlier ones.
+//! Order: backdrop; opaque surfaces; hidden then visible parts of lines; translucent surfaces from far to near; volumes;
+//! hidden then visible glyphs; everything on top. Lines and glyphs write no depth, so later items lie over earlier ones.
+//! Bodies of volumes are drawn twice, first for their depth alone, so that only the nearest shows, once.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -11,7 +12,9 @@ use glam::{DMat4, Mat4, Vec3};
 use super::cache::{Cache, Run};
 use super::color::{Color, ColorScale, MAX_STEPS, mix};
 use super::cull::{Bounds, Frustum, Side};
-use super::frame::{Dash, Display, Emphasis, FrameData, Hidden, LineItem, LineRole, LineStyle, MeshItem};
+use super::frame::{
+    Dash, Display, Emphasis, FrameData, Hidden, LineItem, LineRole, LineStyle, MeshItem, VolumeForm, VolumeItem,
+};
 use super::renderer::{FrameUniform, ITEM_STRIDE, ItemUniform, Layers, Renderer, SCALE_STRIDE, ScaleUniform};
 
 /// What one frame cost.
@@ -25,6 +28,10 @@ pub struct FrameStats {
     pub triangles_total: usize,
     /// Line segments sent to the GPU after culling; visible and hidden pass counted once.
     pub segments: usize,
+    /// Bounding volumes sent to the GPU after culling.
+    pub volumes: usize,
+    /// Bounding volumes of the whole scene.
+    pub volumes_total: usize,
     /// Buffers that had to be rebuilt because their revision changed.
     pub rebuilt: usize,
 }
@@ -60,6 +67,8 @@ pub(super) struct Plan {
     translucent: Vec<Surface>,
     lines: [Vec<Batch>; 3],
     glyphs: [Vec<Batch>; 3],
+    solids: Vec<Batch>,
+    outlines: Vec<Batch>,
     pub stats: FrameStats,
 }
 
@@ -79,6 +88,9 @@ impl Plan {
         plan.translucent.sort_by(|a, b| a.depth.total_cmp(&b.depth));
         for (at, item) in frame.lines.iter().enumerate() {
             plan.add_lines(frame, size, at, item, cache);
+        }
+        for (at, item) in frame.volumes.iter().enumerate() {
+            plan.add_volumes(frame, size, at, item, cache);
         }
         for (at, item) in frame.glyphs.iter().enumerate() {
             let Some(gpu) = cache.glyphs(item.key) else { continue };
@@ -177,6 +189,32 @@ impl Plan {
         }
     }
 
+    fn add_volumes(&mut self, frame: &FrameData, size: [u32; 2], at: usize, item: &VolumeItem, cache: &Cache) {
+        let Some(gpu) = cache.volumes(item.key) else { return };
+        self.stats.volumes_total += gpu.count;
+        let mv = model_view(frame, item.volumes.origin);
+        let frustum = Frustum::new(&(frame.projection_f32() * mv), margin(size, 4.0));
+        let runs = visible(&frustum, &gpu.bounds, &gpu.runs);
+        if runs.is_empty() {
+            return;
+        }
+        self.stats.volumes += runs.iter().map(|r| r.len()).sum::<usize>();
+        let cut = flag(item.sectioned);
+        let (width, fill) = match item.form {
+            VolumeForm::Outline { width, fill } => (width, fill),
+            VolumeForm::Solid => {
+                let uniform = self.item(mv, [1.0, 1.0, 1.0, item.opacity], [0.0; 4], [cut, 0.0, 0.0, 0.0], [0.0; 4]);
+                self.solids.push(Batch { item: at, uniform, runs: runs.clone() });
+                (1.0, 0.0)
+            }
+        };
+        let half = (0.5 * width * frame.pixels_per_point).max(0.25);
+        // The silhouettes of bodies are drawn over them a little denser.
+        let opacity = if item.form == VolumeForm::Solid { (1.6 * item.opacity).min(1.0) } else { item.opacity };
+        let uniform = self.item(mv, [1.0, 1.0, 1.0, opacity], [0.0; 4], [cut, half, fill, 0.0], [0.0; 4]);
+        self.outlines.push(Batch { item: at, uniform, runs });
+    }
+
     fn scale(&mut self, scale: &Arc<ColorScale>) -> u32 {
         if let Some(at) = self.known_scales.iter().position(|s| Arc::ptr_eq(s, scale)) {
             return at as u32;
@@ -240,14 +278,22 @@ impl Plan {
             self.stats.draws += lines(pass, &self.lines[layer], frame, cache, groups);
         }
         surfaces(pass, &self.translucent, false);
+        for pipeline in [&renderer.volumes.depth, &renderer.volumes.solid] {
+            pass.set_pipeline(pipeline);
+            self.stats.draws += volumes(pass, &self.solids, renderer, frame, cache, groups);
+        }
+        pass.set_pipeline(&renderer.volumes.outline);
+        let outlines = |item: usize| Some(&cache.volumes(frame.volumes[item].key)?.instances);
+        self.stats.draws += strips(pass, &self.outlines, groups, outlines);
+        let glyphs = |item: usize| Some(&cache.glyphs(frame.glyphs[item].key)?.instances);
         for layer in [HIDDEN, VISIBLE] {
             pass.set_pipeline(pipeline(&renderer.glyphs, layer));
-            self.stats.draws += glyphs(pass, &self.glyphs[layer], frame, cache, groups);
+            self.stats.draws += strips(pass, &self.glyphs[layer], groups, glyphs);
         }
         pass.set_pipeline(&renderer.lines.on_top);
         self.stats.draws += lines(pass, &self.lines[ON_TOP], frame, cache, groups);
         pass.set_pipeline(&renderer.glyphs.on_top);
-        self.stats.draws += glyphs(pass, &self.glyphs[ON_TOP], frame, cache, groups);
+        self.stats.draws += strips(pass, &self.glyphs[ON_TOP], groups, glyphs);
         self.stats.draws += draws;
     }
 }
@@ -289,18 +335,45 @@ fn lines(
     draws
 }
 
-fn glyphs(
+/// Above this many bodies a coarser template is round enough: each is small.
+const ROUND: usize = 300;
+
+fn volumes(
     pass: &mut wgpu::RenderPass<'_>,
     batches: &[Batch],
+    renderer: &Renderer,
     frame: &FrameData,
     cache: &Cache,
     groups: &Groups<'_>,
 ) -> usize {
     let mut draws = 0;
     for batch in batches {
-        let Some(gpu) = cache.glyphs(frame.glyphs[batch.item].key) else { continue };
+        let Some(gpu) = cache.volumes(frame.volumes[batch.item].key) else { continue };
+        let template = &renderer.volumes.templates[usize::from(gpu.count > ROUND)];
         pass.set_bind_group(1, groups.items, &[batch.uniform * ITEM_STRIDE as u32]);
         pass.set_vertex_buffer(0, gpu.instances.slice(..));
+        pass.set_vertex_buffer(1, template.vertices.slice(..));
+        pass.set_index_buffer(template.indices.slice(..), wgpu::IndexFormat::Uint32);
+        for run in &batch.runs {
+            pass.draw_indexed(0..template.count, 0, run.clone());
+            draws += 1;
+        }
+    }
+    draws
+}
+
+/// Four corners for every instance: glyphs and silhouettes of volumes.
+fn strips<'c>(
+    pass: &mut wgpu::RenderPass<'_>,
+    batches: &[Batch],
+    groups: &Groups<'_>,
+    instances: impl Fn(usize) -> Option<&'c wgpu::Buffer>,
+) -> usize {
+    let mut draws = 0;
+    for batch in batches {
+        let Some(buffer) = instances(batch.item) else { continue };
+        pass.set_bind_group(1, groups.items, &[batch.uniform * ITEM_STRIDE as u32]);
+        pass.set_vertex_buffer(0, buffer.slice(..));
         for run in &batch.runs {
             pass.draw(0..4, run.clone());
             draws += 1;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::{DMat4, DVec3};
 
 use super::color::{Color, ColorScale, srgb};
+use crate::view::rounded_box::RoundedBox;
 
 /// Names one thing that has buffers on the GPU. Meshes, lines and glyphs have separate name spaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -416,6 +417,49 @@ pub struct GlyphItem {
     pub sectioned: bool,
 }
 
+/// Boxes swept by spheres, each with a colour.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct VolumeData {
+    /// Model position of the local (0, 0, 0) on the GPU.
+    pub origin: DVec3,
+    /// The volumes, in model coordinates. Neighbours in the list should be neighbours in space: the list is culled in
+    /// runs.
+    pub volumes: Arc<Vec<RoundedBox>>,
+    /// Their colours: sRGB with alpha.
+    pub colors: Vec<[u8; 4]>,
+}
+
+/// How volumes are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum VolumeForm {
+    /// As translucent bodies, the nearest only, with their silhouettes.
+    Solid,
+    /// As silhouettes with a faint inside.
+    Outline {
+        /// The width of the line in points.
+        width: f32,
+        /// How opaque the inside is, 0..=1.
+        fill: f32,
+    },
+}
+
+/// Volumes to draw. They lie over surfaces and lines.
+#[derive(Clone, Debug)]
+pub struct VolumeItem {
+    /// Its name on the GPU.
+    pub key: Key,
+    /// Changes whenever the volumes do.
+    pub revision: u64,
+    /// The volumes.
+    pub volumes: Arc<VolumeData>,
+    /// Bodies or silhouettes.
+    pub form: VolumeForm,
+    /// How opaque they are, times the alpha of their colours.
+    pub opacity: f32,
+    /// Whether the section plane cuts them.
+    pub sectioned: bool,
+}
+
 /// Everything one frame shows.
 #[derive(Clone, Debug)]
 pub struct FrameData {
@@ -437,6 +481,8 @@ pub struct FrameData {
     pub meshes: Vec<MeshItem>,
     /// Lines.
     pub lines: Vec<LineItem>,
+    /// Bounding volumes.
+    pub volumes: Vec<VolumeItem>,
     /// Points.
     pub glyphs: Vec<GlyphItem>,
 }
@@ -454,6 +500,7 @@ impl FrameData {
             section: None,
             meshes: Vec::new(),
             lines: Vec::new(),
+            volumes: Vec::new(),
             glyphs: Vec::new(),
         }
     }

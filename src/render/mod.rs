@@ -16,20 +16,23 @@ mod cull;
 mod encode;
 mod frame;
 mod gpu;
+mod inspect;
 mod offscreen;
 mod renderer;
 mod stage;
 mod target;
 mod theme;
 mod viewport;
+mod volume;
 
 pub use color::{Color, ColorScale, MAX_STEPS, PALETTE, mix, srgb, to_srgb8, with_alpha};
 pub use encode::FrameStats;
 pub use frame::{
     Background, CameraData, Dash, Display, Emphasis, Field, FrameData, Glyph, GlyphData, GlyphItem, GlyphShape, Hidden,
-    Key, LineData, LineItem, LineRole, LineStyle, MeshData, MeshItem, Section,
+    Key, LineData, LineItem, LineRole, LineStyle, MeshData, MeshItem, Section, VolumeData, VolumeForm, VolumeItem,
 };
 pub use gpu::{Gpu, GpuError};
+pub use inspect::{BODIES, THIN};
 pub use offscreen::{Offscreen, OffscreenError};
 pub use renderer::{Renderer, shader_sources};
 pub use stage::{Coloring, Look, Stage};

@@ -8,12 +8,14 @@ use wgpu::{BlendState, CompareFunction, ShaderStages, TextureFormat, VertexForma
 use super::cache::{GlyphInstance, LINE_POINT, SurfaceVertex};
 use super::color::MAX_STEPS;
 use super::target::{COLOR_FORMAT, DEPTH_FORMAT, SAMPLES};
+use super::volume::{Template, TemplateVertex, VolumeInstance};
 
 const COMMON: &str = include_str!("../../shaders/common.wgsl");
 const BACKGROUND: &str = include_str!("../../shaders/background.wgsl");
 const SURFACE: &str = include_str!("../../shaders/surface.wgsl");
 const LINE: &str = include_str!("../../shaders/line.wgsl");
 const GLYPH: &str = include_str!("../../shaders/glyph.wgsl");
+const VOLUME: &str = include_str!("../../shaders/volume.wgsl");
 const BLIT: &str = include_str!("../../shaders/blit.wgsl");
 
 /// Every shader module as the GPU gets it: name and WGSL.
@@ -24,6 +26,7 @@ pub fn shader_sources() -> Vec<(&'static str, Cow<'static, str>)> {
         ("surface", scene(SURFACE)),
         ("line", scene(LINE)),
         ("glyph", scene(GLYPH)),
+        ("volume", scene(VOLUME)),
         ("blit", Cow::Borrowed(BLIT)),
     ]
 }
@@ -87,6 +90,19 @@ pub(super) struct Surfaces {
     pub translucent: wgpu::RenderPipeline,
 }
 
+/// Bodies and silhouettes of bounding volumes.
+#[derive(Debug)]
+pub(super) struct Volumes {
+    /// The depth of bodies alone.
+    pub depth: wgpu::RenderPipeline,
+    /// The bodies.
+    pub solid: wgpu::RenderPipeline,
+    /// Their silhouettes.
+    pub outline: wgpu::RenderPipeline,
+    /// A round and a coarse template.
+    pub templates: [Template; 2],
+}
+
 /// All pipelines for one screen format. Immutable; share it in an `Arc` between viewports.
 #[derive(Debug)]
 pub struct Renderer {
@@ -100,6 +116,7 @@ pub struct Renderer {
     pub(super) fields: Surfaces,
     pub(super) lines: Layers,
     pub(super) glyphs: Layers,
+    pub(super) volumes: Volumes,
     pub(super) blit: wgpu::RenderPipeline,
 }
 
@@ -187,6 +204,31 @@ impl Renderer {
             on_top: make.pipeline(label, &plain, module, ["vs", "fs"], buffers, Pass::strips(CompareFunction::Always)),
         };
 
+        let volume = scene("volume", VOLUME);
+        let instance_attributes = wgpu::vertex_attr_array![
+            0 => Float32x4, 1 => Float32x4, 2 => Float32x4, 3 => Float32, 4 => Unorm8x4
+        ];
+        let instances = wgpu::VertexBufferLayout {
+            array_stride: size_of::<VolumeInstance>() as u64,
+            step_mode: wgpu::VertexStepMode::Instance,
+            attributes: &instance_attributes,
+        };
+        let template_attributes = wgpu::vertex_attr_array![5 => Float32x3, 6 => Float32x3];
+        let body = [Some(instances.clone()), Some(vertex_layout::<TemplateVertex>(&template_attributes))];
+        let volumes = Volumes {
+            depth: make.pipeline("volume depth", &plain, &volume, ["vs", "fs_depth"], &body, Pass::DEPTH),
+            solid: make.pipeline("volume", &plain, &volume, ["vs", "fs"], &body, Pass::BODY),
+            outline: make.pipeline(
+                "volume outline",
+                &plain,
+                &volume,
+                ["vs_outline", "fs_outline"],
+                &[Some(instances)],
+                Pass::strips(CompareFunction::GreaterEqual),
+            ),
+            templates: [6, 2].map(|arcs| Template::new(device, arcs)),
+        };
+
         let (blit_layout, sampler, blit) = blit(device, screen, layout, module);
         Self {
             background: make.pipeline("background", &plain, &background, ["vs", "fs"], &[], Pass::BACKGROUND),
@@ -194,6 +236,7 @@ impl Renderer {
             fields: surfaces("field", &scaled, "vs_field", "fs_field", &[Some(vertices.clone()), Some(field_values)]),
             lines: layers("line", &line, &line_buffers),
             glyphs: layers("glyph", &glyph, &glyph_buffers),
+            volumes,
             frame_layout,
             item_layout,
             scale_layout,
@@ -220,6 +263,8 @@ struct Pass {
     compare: CompareFunction,
     write: bool,
     bias: wgpu::DepthBiasState,
+    color: wgpu::ColorWrites,
+    cull: Option<wgpu::Face>,
 }
 
 /// Surfaces step back a little, so that what is drawn on them wins; more where they are seen at a grazing angle.
@@ -233,6 +278,23 @@ impl Pass {
         compare: CompareFunction::Always,
         write: false,
         bias: NO_BIAS,
+        color: wgpu::ColorWrites::ALL,
+        cull: None,
+    };
+    /// Closed bodies, seen from outside: depth first, then what has just that depth.
+    const DEPTH: Self = Self {
+        compare: CompareFunction::GreaterEqual,
+        write: true,
+        color: wgpu::ColorWrites::empty(),
+        cull: Some(wgpu::Face::Back),
+        ..Self::BACKGROUND
+    };
+    const BODY: Self = Self {
+        compare: CompareFunction::Equal,
+        write: false,
+        color: wgpu::ColorWrites::ALL,
+        blend: Some(BlendState::PREMULTIPLIED_ALPHA_BLENDING),
+        ..Self::DEPTH
     };
     const OPAQUE: Self =
         Self { compare: CompareFunction::GreaterEqual, write: true, bias: STEP_BACK, ..Self::BACKGROUND };
@@ -244,8 +306,7 @@ impl Pass {
             topology: wgpu::PrimitiveTopology::TriangleStrip,
             blend: Some(BlendState::PREMULTIPLIED_ALPHA_BLENDING),
             compare,
-            write: false,
-            bias: NO_BIAS,
+            ..Self::BACKGROUND
         }
     }
 }
@@ -273,7 +334,7 @@ impl Make<'_> {
                 compilation_options: Default::default(),
                 buffers,
             },
-            primitive: wgpu::PrimitiveState { topology: pass.topology, ..Default::default() },
+            primitive: wgpu::PrimitiveState { topology: pass.topology, cull_mode: pass.cull, ..Default::default() },
             depth_stencil: Some(wgpu::DepthStencilState {
                 format: DEPTH_FORMAT,
                 depth_write_enabled: Some(pass.write),
@@ -289,7 +350,7 @@ impl Make<'_> {
                 targets: &[Some(wgpu::ColorTargetState {
                     format: COLOR_FORMAT,
                     blend: pass.blend,
-                    write_mask: wgpu::ColorWrites::ALL,
+                    write_mask: pass.color,
                 })],
             }),
             multiview_mask: None,

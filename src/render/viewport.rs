@@ -102,6 +102,9 @@ impl Viewport {
         for item in &frame.glyphs {
             self.cache.update_glyphs(device, item);
         }
+        for item in &frame.volumes {
+            self.cache.update_volumes(device, item);
+        }
         let size = self.resize(device, frame.size);
         let mut plan = Plan::new(frame, size, &self.cache);
         self.upload(device, queue, frame, size, &plan);

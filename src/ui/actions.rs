@@ -54,6 +54,7 @@ pub enum Action {
     SelectTool,
     PatchTool,
     AdjustPatch,
+    Inspect,
     CancelJobs,
     Palette,
     Keys,
@@ -266,6 +267,17 @@ pub const ACTIONS: &[Info] = &[
             "Cut the view open along a plane; drag its handle",
         ),
     ),
+    with(
+        Icon::Inspect,
+        entry(
+            Action::Inspect,
+            View,
+            3,
+            "Inspect hierarchy",
+            key(NONE, Key::I),
+            "Look into the bounding volumes and osculating tori of one or two surfaces, level by level",
+        ),
+    ),
     with(Icon::EyeOff, entry(Action::Hide, View, 4, "Hide", key(NONE, Key::H), "Hide what is selected")),
     with(Icon::Isolate, entry(Action::Isolate, View, 4, "Isolate", key(SHIFT, Key::H), "Hide everything else")),
     with(Icon::Eye, entry(Action::ShowAll, View, 4, "Show all", key(ALT, Key::H), "Show every entity again")),
@@ -335,7 +347,7 @@ pub const TOOLBAR: &[&[Action]] = &[
     &[Action::SelectTool, Action::PatchTool],
     &[Action::FrameAll, Action::FrameSelection, Action::Perspective],
     &[Action::Shaded, Action::Wireframe, Action::Xray],
-    &[Action::Edges, Action::IsoLines, Action::Section],
+    &[Action::Edges, Action::IsoLines, Action::Section, Action::Inspect],
     &[Action::Hide, Action::Isolate, Action::ShowAll],
 ];
 

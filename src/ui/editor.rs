@@ -187,6 +187,10 @@ impl Editor {
                 };
                 need(one.is_some_and(|e| matches!(e.shape, Shape::Patch(_))), "select one healed patch")
             }
+            Action::Inspect => need(
+                self.document().entities().iter().any(|e| e.surface().is_some()),
+                "there is no surface to look into",
+            ),
             Action::FrameAll => need(!self.document().entities().is_empty(), "the model is empty"),
             Action::FrameSelection => need(selected, "nothing is selected"),
             Action::CancelJobs => need(!self.jobs.active().is_empty(), "nothing is running"),
@@ -213,6 +217,7 @@ impl Editor {
             Action::UvView => self.settings.uv_view,
             Action::SelectTool => matches!(self.tool, Tool::Select),
             Action::PatchTool => matches!(self.tool, Tool::Patch(_)),
+            Action::Inspect => matches!(self.tool, Tool::Inspect(_)),
             _ => return None,
         })
     }
@@ -329,6 +334,8 @@ impl Editor {
             Action::SelectTool => self.leave_tool(),
             Action::PatchTool => self.start_patch(),
             Action::AdjustPatch => self.adjust_patch(),
+            Action::Inspect if matches!(self.tool, Tool::Inspect(_)) => self.leave_tool(),
+            Action::Inspect => self.start_inspect(),
             Action::CancelJobs => {
                 self.jobs.cancel_all();
                 self.say("Asked every job to stop");

@@ -6,8 +6,8 @@
 
 use glam::DVec2;
 
-/// Pixels left free around a domain that fits.
-const MARGIN: f64 = 26.0;
+/// Pixels left free beside and above a domain that fits: there is room for numbers.
+const MARGIN: DVec2 = DVec2::new(46.0, 26.0);
 /// How much longer one side of the drawn domain may be than the other.
 const ASPECT: f64 = 2.4;
 /// The largest magnification: a millionth of the domain fills the pane.

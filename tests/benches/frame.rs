@@ -10,9 +10,11 @@ use std::time::{Duration, Instant};
 
 use glam::{DVec2, DVec3};
 use patchwright::kernel::geom::{Knots, Surface};
+use patchwright::kernel::job::Job;
 use patchwright::model::document::{Document, Shape, Unit};
-use patchwright::render::{Display, Emphasis, Gpu, Look, Offscreen, Stage};
+use patchwright::render::{Display, Emphasis, Gpu, Key, Look, Offscreen, Stage, VolumeItem};
 use patchwright::view::camera::{Axis, Camera};
+use patchwright::view::inspect::{Coloring, Hierarchy, Shown, VolumeForm};
 use patchwright::view::scene::{Request, Scene};
 use patchwright::view::viewport::{View, Viewport};
 
@@ -139,5 +141,69 @@ fn main() {
         if !software {
             println!("          until the picture is there: {:.3} ms", median(&mut picture));
         }
+    }
+    level(&mut offscreen, screen);
+}
+
+/// A level of 512 x 512 nodes as silhouettes: what the worker takes to dress it, and the frame's share of the CPU
+/// while the camera turns, seen as a whole and from nearby.
+fn level(offscreen: &mut Offscreen, screen: Viewport) {
+    let document = hills(1);
+    let (id, surface) = document.surfaces().next().unwrap();
+    let patch = surface.restricted([0.0, 1.0], [0.0, 1.0]).unwrap();
+    let job = Job::new();
+    let begun = Instant::now();
+    let hierarchy = Hierarchy::build(id, Arc::new(patch), 9, &job).unwrap();
+    let built = begun.elapsed();
+    let begun = Instant::now();
+    let (form, coloring) = (VolumeForm::Swept, Coloring::Error);
+    let shown = Shown::new(&hierarchy.tree, &hierarchy.surface, 9, form, coloring, &job).unwrap();
+    let bounds = hierarchy.surface.bounds();
+    let item = VolumeItem::of_level(Key::new(1, 0), 1, &shown, bounds.center()).unwrap();
+    println!(
+        "level 9 of one Bezier patch: {} nodes, built and counted in {:.1} ms, dressed in {:.1} ms",
+        shown.nodes.len(),
+        built.as_secs_f64() * 1e3,
+        begun.elapsed().as_secs_f64() * 1e3
+    );
+    for (name, closer) in [("whole", 1.0), ("near", 0.15)] {
+        let mut camera = Camera::default();
+        camera.look_along(Axis::Oblique);
+        camera.frame(&bounds, screen);
+        camera.distance *= closer;
+        let scene = Scene::default();
+        let mut stage = Stage::default();
+        let mut frame = || {
+            camera.orbit(camera.target, DVec2::new(3.0, 0.4), screen);
+            let view = View::new(&camera, screen, &bounds);
+            let mut frame = stage.frame(&scene, &view, &Look::default(), |_| Emphasis::Normal);
+            frame.volumes.push(item.clone());
+            Arc::new(frame)
+        };
+        let mut picture = Vec::new();
+        for _ in 0..if offscreen.gpu().software { 3 } else { 40 } {
+            let begun = Instant::now();
+            offscreen.submit(&frame());
+            offscreen.wait();
+            picture.push(begun.elapsed());
+        }
+        let mut encode = Vec::new();
+        let before = cpu();
+        for _ in 0..ROUNDS {
+            let frame = frame();
+            let start = Instant::now();
+            drop(offscreen.encode(&frame));
+            encode.push(start.elapsed());
+        }
+        let all = (cpu() - before).as_secs_f64() * 1e3 / f64::from(ROUNDS);
+        let stats = offscreen.stats();
+        println!(
+            "  {name}: {} of {} volumes after culling, {} draws, encode {:.3} ms, CPU {all:.3} ms, picture {:.1} ms",
+            stats.volumes,
+            stats.volumes_total,
+            stats.draws,
+            median(&mut encode),
+            median(&mut picture)
+        );
     }
 }

@@ -40,6 +40,7 @@ impl Editor {
     pub fn filter_bar(&mut self, ui: &Ui) {
         let (possible, snapping) = match &self.tool {
             Tool::Select => (Filter { points: false, ..Filter::ALL }, false),
+            Tool::Inspect(_) => (Filter::SURFACES, false),
             Tool::Patch(session) => {
                 let wants = session.tool.wants_point();
                 (Filter { points: wants, ..session.tool.filter() }, wants && session.snaps.iter().any(|on| *on))

@@ -16,12 +16,17 @@ use crate::view::pick::{Filter, PickHit, Target};
 use crate::view::uv::UvPicture;
 
 mod filter_bar;
+mod inspect;
+mod inspect_labels;
+mod inspect_overlay;
+mod inspect_panel;
 mod legend;
 mod patch;
 mod patch_overlay;
 mod patch_panel;
 mod select;
 
+use inspect::InspectSession;
 use patch::PatchSession;
 
 /// The active tool.
@@ -30,6 +35,8 @@ pub enum Tool {
     Select,
     /// Four sides are picked and healed.
     Patch(Box<PatchSession>),
+    /// Hierarchies are looked into.
+    Inspect(Box<InspectSession>),
 }
 
 /// The list of everything under the cursor, opened by Alt+click.
@@ -60,6 +67,7 @@ impl Editor {
                 let mut next = || parts.next().unwrap_or_default();
                 (next(), next(), next())
             }
+            Tool::Inspect(_) => self.inspect_prompt(),
         }
     }
 
@@ -70,8 +78,10 @@ impl Editor {
         {
             self.pick_list = None;
         }
-        if let Tool::Patch(_) = self.tool {
-            self.patch_keys(ctx);
+        match self.tool {
+            Tool::Select => {}
+            Tool::Patch(_) => self.patch_keys(ctx),
+            Tool::Inspect(_) => self.inspect_keys(ctx),
         }
     }
 
@@ -103,6 +113,7 @@ impl Editor {
         match &self.tool {
             Tool::Select => self.select_panel(ui),
             Tool::Patch(_) => self.patch_panel(ui),
+            Tool::Inspect(_) => self.inspect_panel(ui),
         }
     }
 
@@ -111,6 +122,7 @@ impl Editor {
         match &self.tool {
             Tool::Select => (Filter::ALL.and(self.pickable), Vec::new(), 0),
             Tool::Patch(session) => (session.tool.filter().and(self.pickable), Vec::new(), session.revision),
+            Tool::Inspect(_) => (Filter::SURFACES.and(self.pickable), Vec::new(), 1),
         }
     }
 
@@ -119,6 +131,7 @@ impl Editor {
         match &self.tool {
             Tool::Select => Overlay::default(),
             Tool::Patch(session) => session.overlay(&self.viewport.scene, dark),
+            Tool::Inspect(session) => session.overlay(dark),
         }
     }
 
@@ -127,15 +140,17 @@ impl Editor {
     pub fn tool_uv(&self) -> Vec<Arc<UvPicture>> {
         match &self.tool {
             Tool::Select | Tool::Patch(_) => Vec::new(),
+            Tool::Inspect(session) => session.pictures.clone(),
         }
     }
 
     /// What the mouse did in the uv view, for the active tool; nothing while it is elsewhere. Marks are known by the
     /// numbers that the tool gave them.
-    pub fn tool_uv_pointer(&mut self, _pointer: Option<&UvPointer>) {
+    pub fn tool_uv_pointer(&mut self, pointer: Option<&UvPointer>) {
         match &self.tool {
             // Neither marks anything there.
             Tool::Select | Tool::Patch(_) => {}
+            Tool::Inspect(_) => self.inspect_uv_pointer(pointer),
         }
     }
 
@@ -151,13 +166,16 @@ impl Editor {
         match &self.tool {
             Tool::Select => self.select_click(pointer),
             Tool::Patch(_) => self.patch_pointer(pointer),
+            Tool::Inspect(_) => self.inspect_pointer(pointer),
         }
     }
 
     /// Draws the active tool's labels over the picture.
     pub fn tool_labels(&mut self, ui: &mut Ui, pointer: &Pointer) {
-        if let Tool::Patch(_) = self.tool {
-            self.patch_labels(ui, pointer);
+        match self.tool {
+            Tool::Select => {}
+            Tool::Patch(_) => self.patch_labels(ui, pointer),
+            Tool::Inspect(_) => self.inspect_labels(ui, pointer),
         }
         self.filter_bar(ui);
         self.show_pick_list(ui);
@@ -192,7 +210,7 @@ impl Editor {
         let Some(hit) = chosen else { return };
         self.pick_list = None;
         match &self.tool {
-            Tool::Select => {
+            Tool::Select | Tool::Inspect(_) => {
                 if let Some(id) = super::viewport::hit_entity(&hit) {
                     self.selection.set([id]);
                 }

@@ -238,6 +238,7 @@ impl Editor {
 
     /// Takes over what the tool's workers have made. True when a heal has ended.
     pub fn poll_tool(&mut self) -> bool {
+        self.poll_inspect();
         let Tool::Patch(session) = &mut self.tool else { return false };
         if session.sketch.poll() {
             session.revision += 1;

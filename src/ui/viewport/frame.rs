@@ -6,7 +6,7 @@ use super::Viewport;
 use crate::model::document::EntityId;
 use crate::model::selection::Selection;
 use crate::render::{
-    self, Color, Coloring, Display, Emphasis, FrameData, GlyphItem, LineItem, Look, MeshItem, Theme, srgb,
+    self, Color, Coloring, Display, Emphasis, FrameData, GlyphItem, LineItem, Look, MeshItem, Theme, VolumeItem, srgb,
 };
 use crate::view::camera::Camera;
 use crate::view::section::SectionPlane;
@@ -26,12 +26,18 @@ pub struct Overlay {
     pub iso_lines: bool,
     /// Draws the model as a faint ghost, so that it does not flicker through what lies on it.
     pub ghost: bool,
+    /// Shows what is selected like the rest.
+    pub calm: bool,
+    /// Entities whose surfaces are not drawn, because something stands for them.
+    pub without: Vec<EntityId>,
     /// Replaces the colours of entities.
     pub fields: Vec<(EntityId, render::Field)>,
     /// Meshes.
     pub meshes: Vec<MeshItem>,
     /// Lines.
     pub lines: Vec<LineItem>,
+    /// Bounding volumes.
+    pub volumes: Vec<VolumeItem>,
     /// Points.
     pub glyphs: Vec<GlyphItem>,
 }
@@ -96,7 +102,9 @@ impl Viewport {
         };
         let hovered = self.hovered;
         let emphasis = |id: EntityId| {
-            if selection.contains(id) {
+            if overlay.calm {
+                Emphasis::Normal
+            } else if selection.contains(id) {
                 Emphasis::Selected
             } else if hovered == Some(id) {
                 Emphasis::Hovered
@@ -111,6 +119,7 @@ impl Viewport {
         for line in frame.lines.iter_mut().filter(|line| line.emphasis == Emphasis::Muted) {
             line.emphasis = Emphasis::Normal;
         }
+        frame.meshes.retain(|item| !overlay.without.iter().any(|id| id.0 == item.key.entity));
         for item in &mut frame.meshes {
             if overlay.ghost {
                 item.color[3] = GHOST;
@@ -119,6 +128,7 @@ impl Viewport {
         }
         frame.meshes.extend(overlay.meshes.iter().cloned());
         frame.lines.extend(overlay.lines.iter().cloned());
+        frame.volumes.extend(overlay.volumes.iter().cloned());
         frame.glyphs.extend(overlay.glyphs.iter().cloned());
         frame
     }
