@@ -4,94 +4,19 @@
 #![cfg(feature = "editor")]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test helper may stop the test")]
 
-use std::path::{Path, PathBuf};
+#[path = "support/window.rs"]
+mod window;
+
+use std::path::Path;
 use std::time::{Duration, Instant};
 
-use egui::{Event, Key, Modifiers, PointerButton, Pos2, pos2};
+use egui::{Event, Key, Modifiers, Pos2, pos2};
 use egui_kittest::kittest::Queryable;
-use egui_kittest::{Harness, HarnessBuilder};
 use glam::DVec3;
 use patchwright::render::Gpu;
-use patchwright::ui::{Action, App, Numpad, Options, Page, Tool};
+use patchwright::ui::{Action, Numpad, Options, Page, Tool};
 use patchwright::view::patch_tool::Event as PatchEvent;
-
-type Window = Harness<'static, App>;
-
-fn asset(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets").join(name)
-}
-
-fn builder() -> HarnessBuilder<App> {
-    Harness::builder().with_size([1400.0, 900.0]).with_max_steps(64)
-}
-
-fn window(builder: HarnessBuilder<App>, options: Options) -> Window {
-    let mut window = builder.build_eframe(|cc| App::new(cc, options));
-    settle(&mut window);
-    window
-}
-
-fn opened(name: &str) -> Window {
-    window(builder(), Options { files: vec![asset(name)], ..Options::default() })
-}
-
-/// Steps until nothing is computed or moves any more.
-fn settle(window: &mut Window) {
-    let start = Instant::now();
-    let mut calm = 0;
-    while calm < 4 {
-        window.step();
-        let editor = &window.state().editor;
-        let busy = !editor.jobs.active().is_empty() || editor.viewport.is_moving() || editor.files.is_opening();
-        calm = if busy { 0 } else { calm + 1 };
-        assert!(start.elapsed() < Duration::from_secs(120), "never calm: {:?}", editor.jobs.active());
-        if busy {
-            std::thread::sleep(Duration::from_millis(5));
-        }
-    }
-}
-
-fn key(window: &mut Window, modifiers: Modifiers, key: Key) {
-    for pressed in [true, false] {
-        window.event(Event::Key { key, physical_key: None, pressed, repeat: false, modifiers });
-    }
-    settle(window);
-}
-
-fn click(window: &mut Window, at: Pos2) {
-    window.event(Event::PointerMoved(at));
-    window.step();
-    for pressed in [true, false] {
-        window.event(Event::PointerButton {
-            pos: at,
-            button: PointerButton::Primary,
-            pressed,
-            modifiers: Modifiers::NONE,
-        });
-        window.step();
-    }
-    settle(window);
-}
-
-/// Clicks a curve where the editor itself says that it can be picked.
-fn pick(window: &mut Window, surface: &str, curve: &str) {
-    let hints = window.state().editor.curve_hints(1.0);
-    let hint = hints.iter().find(|h| h.name == surface && h.curve == curve);
-    let hint = hint.unwrap_or_else(|| panic!("{curve} of {surface} cannot be picked: {hints:?}"));
-    click(window, pos2(hint.at[0], hint.at[1]));
-}
-
-fn prompt(window: &Window) -> String {
-    let (tool, prompt, _) = window.state().editor.prompt();
-    format!("{tool} · {prompt}")
-}
-
-fn picture(window: &mut Window, name: &str) {
-    if let Some(folder) = std::env::var_os("PATCHWRIGHT_PICTURES").filter(|_| window.state().editor.viewport.can_draw())
-    {
-        window.render().unwrap().save(Path::new(&folder).join(format!("{name}.png"))).unwrap();
-    }
-}
+use window::*;
 
 /// Four borders of one panel, healed and accepted.
 fn heal_left_panel(window: &mut Window) {

@@ -13,9 +13,11 @@ use super::{CliError, Common, Exit};
 use crate::kernel::geom::Aabb;
 use crate::kernel::mesh::surface_set::SurfaceSet;
 use crate::model::document::{Document, EntityId};
-use crate::render::{ColorScale, Coloring, Display, Emphasis, Field, Gpu, Key, Look, Offscreen, Stage, Theme};
+use crate::render::{ColorScale, Coloring, Display, Emphasis, Field, Gpu, Key, Look, Offscreen, Sketch, Stage, Theme};
 use crate::view::camera::{Axis, Camera, Projection};
 use crate::view::deviation::deviation;
+use crate::view::intersection::marks::Focus;
+use crate::view::intersection::{Drawing, Found, Picks, Request, Task, compute};
 use crate::view::scene::{ItemKind, Scene};
 use crate::view::viewport::{View, Viewport};
 
@@ -28,6 +30,9 @@ const MEASURE: f64 = 1e-4;
 const MARGIN: f64 = 0.86;
 /// Distances beyond this fraction of the diagonal are no deviations.
 const FAR: f64 = 0.05;
+
+/// The number under which intersections are kept on the graphics card; below those of hierarchies.
+const OWN: u64 = u64::MAX - 1000;
 
 /// From where.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -119,6 +124,15 @@ struct Report {
     segments: usize,
     levels: Vec<LevelReport>,
     deviation: Option<DeviationReport>,
+    intersections: Option<FoundReport>,
+}
+
+#[derive(Debug, Serialize)]
+struct FoundReport {
+    complete: bool,
+    curves: usize,
+    points: usize,
+    unresolved: usize,
 }
 
 #[derive(Debug, Serialize)]
@@ -177,6 +191,13 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
     }
 
     let levels = layers::add(&mut frame, &scene, &args.show, &super::job())?;
+    let found = intersections(args, &document)?;
+    for (at, found) in found.iter().enumerate() {
+        let mut sketch = Sketch::new(OWN - at as u64, 1, scene.bounds().center());
+        let dark = args.theme == Surroundings::Dark;
+        sketch.intersection(&Drawing::new(found, Focus::default(), dark), 1.0, dark);
+        sketch.into_frame(&mut frame);
+    }
 
     let mut offscreen = Offscreen::new(gpu);
     let picture = offscreen.render(&Arc::new(frame))?;
@@ -202,16 +223,33 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
             level.colors
         ));
     }
+    let intersections = (!found.is_empty()).then(|| FoundReport {
+        complete: found.iter().all(|f| f.result.complete),
+        curves: found.iter().map(|f| f.result.curves.len()).sum(),
+        points: found.iter().map(|f| f.result.junctions.len() + f.result.miters.len()).sum(),
+        unresolved: found.iter().map(|f| f.result.unresolved.len()).sum(),
+    });
+    if let Some(f) = &intersections {
+        common.say(format!("{} intersection curves, {} points, {} unresolved", f.curves, f.points, f.unresolved));
+    }
+    let complete = intersections.as_ref().is_none_or(|f| f.complete);
     let adapter = offscreen.gpu().name.clone();
-    common.json(&Report {
-        size: args.size,
-        adapter,
-        triangles,
-        segments,
-        levels,
-        deviation: measured.map(|(_, d)| d),
-    })?;
-    Ok(Exit::Done)
+    let deviation = measured.map(|(_, d)| d);
+    common.json(&Report { size: args.size, adapter, triangles, segments, levels, deviation, intersections })?;
+    Ok(if complete { Exit::Done } else { Exit::Incomplete })
+}
+
+/// What is to be drawn of intersections.
+fn intersections(args: &Args, document: &Document) -> Result<Vec<Found>, CliError> {
+    let mut out = Vec::new();
+    let all: Vec<EntityId> = document.entities().iter().filter(|e| e.surface().is_some()).map(|e| e.id).collect();
+    let tasks = [(Show::Intersections, Task::Pairs), (Show::SelfIntersections, Task::Itself)];
+    for (_, task) in tasks.into_iter().filter(|(show, _)| args.show.contains(show)) {
+        let request = Request::new(&Picks::new(task, &all), document).map_err(|e| CliError::BadArguments(e.into()))?;
+        let job = super::job();
+        out.push(compute(&request, &job).map_err(CliError::BadArguments)?);
+    }
+    Ok(out)
 }
 
 fn keep_only(document: &mut Document, only: &[usize]) -> Result<(), CliError> {

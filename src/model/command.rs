@@ -66,6 +66,13 @@ pub enum Command {
         /// Names and surfaces.
         surfaces: Vec<(String, Arc<Surface>)>,
     },
+    /// Puts another surface in the place of one, under the same id.
+    ReplaceSurface {
+        /// Which one.
+        id: EntityId,
+        /// What takes its place.
+        surface: Arc<Surface>,
+    },
 }
 
 /// Why a command could not be applied. The document is untouched.
@@ -80,6 +87,12 @@ pub enum CommandError {
     /// The command needs a patch and got something else.
     #[error("entity {id} is no healed patch")]
     NoPatch {
+        /// Its number.
+        id: u64,
+    },
+    /// The command needs a surface and got something else.
+    #[error("entity {id} is no surface")]
+    NoSurface {
         /// Its number.
         id: u64,
     },
@@ -115,6 +128,7 @@ impl Command {
             },
             Self::AddCurves { curves } => format!("Add {} curves", curves.len()),
             Self::AddSurfaces { surfaces } => format!("Add {} surfaces", surfaces.len()),
+            Self::ReplaceSurface { .. } => "Change surface".to_owned(),
         }
     }
 
@@ -196,6 +210,13 @@ impl Command {
                 for (name, surface) in surfaces {
                     next.add(name.clone(), Shape::Surface(Arc::clone(surface)), None);
                 }
+            }
+            Self::ReplaceSurface { id, surface } => {
+                all_there(&[*id])?;
+                if !matches!(document.get(*id).map(|e| &e.shape), Some(Shape::Surface(_))) {
+                    return Err(CommandError::NoSurface { id: id.0 });
+                }
+                next.edit(*id, |e| e.shape = Shape::Surface(Arc::clone(surface)));
             }
         }
         Ok(next)

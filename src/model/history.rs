@@ -54,6 +54,20 @@ impl History {
         Ok(())
     }
 
+    /// Applies a command that follows a slider: steps of the same name in a row are one step of the history, so that one
+    /// undo takes back the whole drag. A state that is on disk stays a step of its own.
+    pub fn apply_merged(&mut self, command: &Command) -> Result<(), CommandError> {
+        let repeats = self.undo_label() == Some(&command.label()) && self.redo_label().is_none();
+        if !repeats || self.saved == Some(self.current) {
+            return self.apply(command);
+        }
+        // The step before is replaced: the command says the whole change, not what is new in it.
+        let next = command.apply(self.document())?;
+        self.states[self.current] = next;
+        self.revision += 1;
+        Ok(())
+    }
+
     /// Goes one step back and says what was undone.
     pub fn undo(&mut self) -> Option<&str> {
         self.current = self.current.checked_sub(1)?;
@@ -158,6 +172,31 @@ mod tests {
         history.apply(&add()).unwrap();
         assert!(history.is_dirty(), "the saved state is gone");
         assert_eq!(history.redo_label(), None);
+    }
+
+    #[test]
+    fn a_drag_of_a_slider_is_one_step() {
+        use crate::kernel::geom::Surface;
+        use crate::model::document::Shape;
+        let flat = |z: f64| {
+            let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X + DVec3::Y];
+            Arc::new(Surface::bilinear(corners.map(|p| p + DVec3::Z * z)).unwrap())
+        };
+        let mut document = Document::default();
+        let id = document.add("plane", Shape::Surface(flat(0.0)), None);
+        let mut history = History::new(document, true);
+        let height = |h: &History| h.document().surfaces().next().unwrap().1.point(0, 0).z;
+        for z in [1.0, 2.0, 3.0] {
+            history.apply_merged(&Command::ReplaceSurface { id, surface: flat(z) }).unwrap();
+        }
+        assert_eq!((height(&history), history.steps().1, history.is_dirty()), (3.0, 1, true));
+        history.mark_saved();
+        history.apply_merged(&Command::ReplaceSurface { id, surface: flat(4.0) }).unwrap();
+        assert!(history.is_dirty() && history.steps().1 == 2);
+        history.undo();
+        assert!(!history.is_dirty() && height(&history) == 3.0);
+        history.undo();
+        assert_eq!(height(&history), 0.0);
     }
 
     #[test]

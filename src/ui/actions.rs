@@ -55,6 +55,13 @@ pub enum Action {
     PatchTool,
     AdjustPatch,
     Inspect,
+    IntersectTool,
+    IntersectVisible,
+    SelfIntersectTool,
+    SearchSelfIntersections,
+    KeepCurves,
+    CoaxialDemo,
+    MiterDemo,
     CancelJobs,
     Palette,
     Keys,
@@ -69,12 +76,13 @@ pub enum Menu {
     Edit,
     View,
     Heal,
+    Analyse,
     Help,
 }
 
 impl Menu {
     /// All menus.
-    pub const ALL: [Self; 5] = [Self::File, Self::Edit, Self::View, Self::Heal, Self::Help];
+    pub const ALL: [Self; 6] = [Self::File, Self::Edit, Self::View, Self::Heal, Self::Analyse, Self::Help];
 
     /// What the menu bar writes.
     pub fn title(self) -> &'static str {
@@ -83,6 +91,7 @@ impl Menu {
             Self::Edit => "Edit",
             Self::View => "View",
             Self::Heal => "Heal",
+            Self::Analyse => "Analyse",
             Self::Help => "Help",
         }
     }
@@ -154,7 +163,7 @@ const SHIFT: Modifiers = Modifiers::SHIFT;
 const ALT: Modifiers = Modifiers::ALT;
 const CTRL_SHIFT: Modifiers = Modifiers::COMMAND.plus(Modifiers::SHIFT);
 
-use Menu::{Edit, File, Heal, Help, View};
+use Menu::{Analyse, Edit, File, Heal, Help, View};
 
 /// Every action, in menu order.
 pub const ACTIONS: &[Info] = &[
@@ -327,6 +336,68 @@ pub const ACTIONS: &[Info] = &[
         "Ask every running computation to stop",
     ),
     with(
+        Icon::Intersect,
+        entry(
+            Action::IntersectTool,
+            Analyse,
+            0,
+            "Intersect",
+            key(NONE, Key::X),
+            "Find every curve and point in which two surfaces or sets of surfaces meet",
+        ),
+    ),
+    entry(
+        Action::IntersectVisible,
+        Analyse,
+        0,
+        "Intersect all visible",
+        key(CTRL_SHIFT, Key::X),
+        "Find where the visible surfaces meet each other, all pairs",
+    ),
+    with(
+        Icon::SelfIntersect,
+        entry(
+            Action::SelfIntersectTool,
+            Analyse,
+            1,
+            "Self-intersection",
+            key(SHIFT, Key::X),
+            "Find where a surface meets itself, and the miter points in which such curves end",
+        ),
+    ),
+    entry(
+        Action::SearchSelfIntersections,
+        Analyse,
+        1,
+        "Search all for self-intersections",
+        None,
+        "Look through every visible surface in the background",
+    ),
+    entry(
+        Action::KeepCurves,
+        Analyse,
+        2,
+        "Keep curves",
+        key(NONE, Key::K),
+        "Make the curves that were found free curves of the model, to be picked as sides of a patch",
+    ),
+    entry(
+        Action::CoaxialDemo,
+        Analyse,
+        3,
+        "Cylinder-angle demo",
+        None,
+        "Two nearly coaxial cylinders whose intersection follows a slider",
+    ),
+    entry(
+        Action::MiterDemo,
+        Analyse,
+        3,
+        "Miter-point demo",
+        None,
+        "A cross-cap and the plane through its miter point, moved by sliders",
+    ),
+    with(
         Icon::Search,
         entry(Action::Palette, Help, 0, "Find command…", key(CTRL, Key::K), "Search all commands by name"),
     ),
@@ -344,7 +415,7 @@ pub fn info(action: Action) -> &'static Info {
 pub const TOOLBAR: &[&[Action]] = &[
     &[Action::Open, Action::Save],
     &[Action::Undo, Action::Redo],
-    &[Action::SelectTool, Action::PatchTool],
+    &[Action::SelectTool, Action::PatchTool, Action::IntersectTool, Action::SelfIntersectTool],
     &[Action::FrameAll, Action::FrameSelection, Action::Perspective],
     &[Action::Shaded, Action::Wireframe, Action::Xray],
     &[Action::Edges, Action::IsoLines, Action::Section, Action::Inspect],

@@ -292,7 +292,10 @@ impl Dialog {
             }
             Self::Save(what, field, then) => {
                 let what = *what;
-                ui.heading(if what == SaveWhat::Spec { "Save patch specification" } else { "Save as" });
+                ui.heading(match what {
+                    SaveWhat::Model => "Save as",
+                    SaveWhat::Spec => "Save patch specification",
+                });
                 ui.add_space(6.0);
                 let enter = field.show(ui, true);
                 ui.add_space(2.0);

@@ -20,6 +20,7 @@ use crate::model::document::{Document, EntityId, Shape};
 use crate::model::history::History;
 use crate::model::selection::Selection;
 use crate::view::camera::{Axis, Projection};
+use crate::view::intersection::Task;
 use crate::view::pick::Filter;
 use crate::view::visibility::{self, VisibilityKey};
 use crate::work::Jobs;
@@ -191,6 +192,14 @@ impl Editor {
                 self.document().entities().iter().any(|e| e.surface().is_some()),
                 "there is no surface to look into",
             ),
+            Action::IntersectTool | Action::SelfIntersectTool | Action::SearchSelfIntersections => {
+                need(self.document().entities().iter().any(|e| e.surface().is_some()), "there is no surface")
+            }
+            Action::IntersectVisible => {
+                let shown = self.document().entities().iter().filter(|e| e.visible && e.surface().is_some());
+                need(shown.count() > 1, "fewer than two surfaces are visible")
+            }
+            Action::KeepCurves => need(self.has_found_curves(), "no intersection curves have been found"),
             Action::FrameAll => need(!self.document().entities().is_empty(), "the model is empty"),
             Action::FrameSelection => need(selected, "nothing is selected"),
             Action::CancelJobs => need(!self.jobs.active().is_empty(), "nothing is running"),
@@ -218,6 +227,8 @@ impl Editor {
             Action::SelectTool => matches!(self.tool, Tool::Select),
             Action::PatchTool => matches!(self.tool, Tool::Patch(_)),
             Action::Inspect => matches!(self.tool, Tool::Inspect(_)),
+            Action::IntersectTool => self.intersect_task().is_some_and(|task| task != Task::Itself),
+            Action::SelfIntersectTool => self.intersect_task() == Some(Task::Itself),
             _ => return None,
         })
     }
@@ -336,6 +347,13 @@ impl Editor {
             Action::AdjustPatch => self.adjust_patch(),
             Action::Inspect if matches!(self.tool, Tool::Inspect(_)) => self.leave_tool(),
             Action::Inspect => self.start_inspect(),
+            Action::IntersectTool => self.start_intersect(Task::Sets),
+            Action::IntersectVisible => self.start_intersect(Task::Pairs),
+            Action::SelfIntersectTool => self.start_intersect(Task::Itself),
+            Action::SearchSelfIntersections => self.search_self_intersections(),
+            Action::KeepCurves => self.keep_curves(),
+            Action::CoaxialDemo => self.start_coaxial_demo(),
+            Action::MiterDemo => self.open_example(crate::model::examples::cross_cap::NAME),
             Action::CancelJobs => {
                 self.jobs.cancel_all();
                 self.say("Asked every job to stop");

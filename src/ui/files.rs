@@ -6,6 +6,7 @@ use std::sync::LazyLock;
 use super::dialogs::{Dialog, PathField, Problem, SaveWhat, Then};
 use super::editor::{Editor, Page};
 use crate::io::{self, ImportReport, SaveOptions, Saved};
+use crate::model;
 use crate::model::document::Document;
 use crate::model::history::History;
 use crate::model::replay::spec_of;
@@ -269,8 +270,10 @@ fn write_spec(path: &Path, document: &Document) -> Result<Saved, String> {
 
 /// The bundled examples: names and what each shows.
 pub fn examples() -> &'static [(&'static str, &'static str)] {
-    static LIST: LazyLock<Vec<(&str, &str)>> =
-        LazyLock::new(|| crate::model::examples::all().iter().map(|e| (e.name, e.about)).collect());
+    static LIST: LazyLock<Vec<(&str, &str)>> = LazyLock::new(|| {
+        let demos = model::examples::demos().into_iter().map(|demo| (demo.name, demo.about));
+        model::examples::all().iter().map(|e| (e.name, e.about)).chain(demos).collect()
+    });
     &LIST
 }
 
@@ -286,14 +289,19 @@ impl Editor {
 
     /// Opens an example, unsaved changes or not.
     pub fn open_example_now(&mut self, name: &'static str) {
-        let Some(example) = crate::model::examples::all().into_iter().find(|e| e.name == name) else {
+        let healed = model::examples::all().into_iter().find(|e| e.name == name).map(|e| (e.document, e.about));
+        let demo = || model::examples::demos().into_iter().find(|d| d.name == name).map(|d| ((d.document)(), d.about));
+        let Some((document, about)) = healed.or_else(demo) else {
             self.warn(format!("There is no example called {name}"));
             return;
         };
-        self.show_document(example.document, None, readable(name), true);
+        self.show_document(document, None, readable(name), true);
         self.files.source = None;
         self.autosave_fresh(None);
-        self.say(example.about);
+        if model::examples::demos().iter().any(|demo| demo.name == name) {
+            self.begin_demo(name);
+        }
+        self.say(about);
     }
 
     /// Opens the example that a session without files starts with.

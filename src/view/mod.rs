@@ -9,6 +9,7 @@ mod facet_shading;
 pub mod feature_edges;
 pub mod histogram;
 pub mod inspect;
+pub mod intersection;
 pub mod legend;
 pub mod navigation;
 pub mod patch_tool;

@@ -31,6 +31,10 @@ pub enum Show {
     Patches,
     /// Distance of the healed patches from the surfaces, in colour
     Deviation,
+    /// Curves and points in which the surfaces meet each other
+    Intersections,
+    /// Curves in which surfaces meet themselves, and miter points
+    SelfIntersections,
     /// A level of the hierarchies of all surfaces that are drawn
     #[value(skip)]
     Level(VolumeForm, u32, Coloring),

@@ -5,6 +5,8 @@
 //! out here.
 
 mod car;
+pub mod coaxial;
+pub mod cross_cap;
 mod simple;
 mod wing;
 
@@ -40,6 +42,25 @@ pub fn all() -> Vec<Example> {
         simple::oscillating_surfaces(),
         car::car_body(),
         wing::wing_body(),
+    ]
+}
+
+/// A model that demonstrates something and has nothing to heal.
+#[derive(Clone, Copy, Debug)]
+pub struct Demo {
+    /// Its name.
+    pub name: &'static str,
+    /// One line about it.
+    pub about: &'static str,
+    /// Makes the model.
+    pub document: fn() -> Document,
+}
+
+/// All demonstrations.
+pub fn demos() -> [Demo; 2] {
+    [
+        Demo { name: coaxial::NAME, about: coaxial::ABOUT, document: coaxial::document },
+        Demo { name: cross_cap::NAME, about: cross_cap::ABOUT, document: cross_cap::document },
     ]
 }
 

@@ -11,15 +11,22 @@ use super::panels::uv::UvPointer;
 use super::viewport::{Overlay, Pointer, curve_name};
 use super::{status, theme};
 use crate::view::display::Geometry;
+use crate::view::intersection::Task;
 use crate::view::patch_tool::{Event, Stage};
 use crate::view::pick::{Filter, PickHit, Target};
 use crate::view::uv::UvPicture;
+use crate::work::Ticket;
 
 mod filter_bar;
 mod inspect;
 mod inspect_labels;
 mod inspect_overlay;
 mod inspect_panel;
+mod intersect;
+mod intersect_overlay;
+mod intersect_panel;
+mod intersect_plane;
+mod intersect_uv;
 mod legend;
 mod patch;
 mod patch_overlay;
@@ -27,6 +34,7 @@ mod patch_panel;
 mod select;
 
 use inspect::InspectSession;
+use intersect::IntersectSession;
 use patch::PatchSession;
 
 /// The active tool.
@@ -37,6 +45,8 @@ pub enum Tool {
     Patch(Box<PatchSession>),
     /// Hierarchies are looked into.
     Inspect(Box<InspectSession>),
+    /// Surfaces are intersected with each other or with themselves.
+    Intersect(Box<IntersectSession>),
 }
 
 /// The list of everything under the cursor, opened by Alt+click.
@@ -68,6 +78,7 @@ impl Editor {
                 (next(), next(), next())
             }
             Tool::Inspect(_) => self.inspect_prompt(),
+            Tool::Intersect(session) => Self::intersect_prompt(session),
         }
     }
 
@@ -82,6 +93,7 @@ impl Editor {
             Tool::Select => {}
             Tool::Patch(_) => self.patch_keys(ctx),
             Tool::Inspect(_) => self.inspect_keys(ctx),
+            Tool::Intersect(_) => self.intersect_keys(ctx),
         }
     }
 
@@ -99,13 +111,28 @@ impl Editor {
 
     /// Leaves the active tool.
     pub fn leave_tool(&mut self) {
-        if let Tool::Patch(session) = &self.tool
-            && let Some(ticket) = &session.healing
-        {
-            ticket.cancel();
+        match &self.tool {
+            Tool::Select => {}
+            Tool::Patch(session) => session.healing.iter().for_each(Ticket::cancel),
+            Tool::Intersect(session) => session.running.iter().for_each(Ticket::cancel),
         }
         self.tool = Tool::Select;
         self.pick_list = None;
+    }
+
+    /// What the intersection tool intersects, while it is on.
+    pub fn intersect_task(&self) -> Option<Task> {
+        match &self.tool {
+            Tool::Intersect(session) => Some(session.picks.task),
+            _ => None,
+        }
+    }
+
+    /// Takes over what the tools' workers have made. True when a heal has ended.
+    pub fn poll_tool(&mut self) -> bool {
+        self.poll_inspect();
+        self.poll_intersect();
+        self.poll_patch()
     }
 
     /// The Tool page.
@@ -114,6 +141,7 @@ impl Editor {
             Tool::Select => self.select_panel(ui),
             Tool::Patch(_) => self.patch_panel(ui),
             Tool::Inspect(_) => self.inspect_panel(ui),
+            Tool::Intersect(_) => self.intersect_panel(ui),
         }
     }
 
@@ -123,15 +151,22 @@ impl Editor {
             Tool::Select => (Filter::ALL.and(self.pickable), Vec::new(), 0),
             Tool::Patch(session) => (session.tool.filter().and(self.pickable), Vec::new(), session.revision),
             Tool::Inspect(_) => (Filter::SURFACES.and(self.pickable), Vec::new(), 1),
+            Tool::Intersect(session) => {
+                (Filter::SURFACES.and(self.pickable), Vec::new(), u64::from(session.found.is_some()))
+            }
         }
     }
 
     /// What the active tool adds to the picture.
     pub fn tool_overlay(&mut self, dark: bool) -> Overlay {
-        match &self.tool {
+        match &mut self.tool {
             Tool::Select => Overlay::default(),
             Tool::Patch(session) => session.overlay(&self.viewport.scene, dark),
             Tool::Inspect(session) => session.overlay(dark),
+            Tool::Intersect(session) => {
+                session.refresh_uv(dark);
+                session.overlay(&self.viewport.scene, dark)
+            }
         }
     }
 
@@ -141,6 +176,7 @@ impl Editor {
         match &self.tool {
             Tool::Select | Tool::Patch(_) => Vec::new(),
             Tool::Inspect(session) => session.pictures.clone(),
+            Tool::Intersect(session) => session.uv_pictures(),
         }
     }
 
@@ -151,6 +187,7 @@ impl Editor {
             // Neither marks anything there.
             Tool::Select | Tool::Patch(_) => {}
             Tool::Inspect(_) => self.inspect_uv_pointer(pointer),
+            Tool::Intersect(_) => self.intersect_uv_pointer(pointer),
         }
     }
 
@@ -167,6 +204,7 @@ impl Editor {
             Tool::Select => self.select_click(pointer),
             Tool::Patch(_) => self.patch_pointer(pointer),
             Tool::Inspect(_) => self.inspect_pointer(pointer),
+            Tool::Intersect(_) => self.intersect_pointer(pointer),
         }
     }
 
@@ -176,6 +214,7 @@ impl Editor {
             Tool::Select => {}
             Tool::Patch(_) => self.patch_labels(ui, pointer),
             Tool::Inspect(_) => self.inspect_labels(ui, pointer),
+            Tool::Intersect(_) => self.intersect_labels(ui),
         }
         self.filter_bar(ui);
         self.show_pick_list(ui);
@@ -218,6 +257,10 @@ impl Editor {
             Tool::Patch(_) => {
                 let held = crate::view::navigation::Modifiers::NONE;
                 self.patch_event(Event::Click { hit: Some(hit), snap: None, held });
+            }
+            Tool::Intersect(_) => {
+                let held = crate::view::navigation::Modifiers::NONE;
+                self.intersect_pointer(&Pointer { click: Some((Some(hit), held)), ..Pointer::default() });
             }
         }
     }

@@ -237,8 +237,7 @@ impl Editor {
     }
 
     /// Takes over what the tool's workers have made. True when a heal has ended.
-    pub fn poll_tool(&mut self) -> bool {
-        self.poll_inspect();
+    pub fn poll_patch(&mut self) -> bool {
         let Tool::Patch(session) = &mut self.tool else { return false };
         if session.sketch.poll() {
             session.revision += 1;

@@ -14,10 +14,7 @@ use super::patch::PatchSession;
 use crate::kernel::heal::grid::Grid;
 use crate::kernel::heal::project::Status;
 use crate::kernel::mesh::tessellate::SurfaceMesh;
-use crate::render::{
-    Color, ColorScale, Dash, Emphasis, Field, GlyphData, GlyphItem, GlyphShape, Hidden, Key, LineData, LineItem,
-    LineRole, LineStyle, MeshData, MeshItem, with_alpha,
-};
+use crate::render::{Color, ColorScale, Dash, Field, GlyphData, GlyphShape, Hidden, LineStyle, Sketch, with_alpha};
 use crate::view::colormap;
 use crate::view::feature_edges::{EdgeKind, EdgePiece, LinePattern};
 use crate::view::patch_tool::{Mode, Stage};
@@ -27,88 +24,13 @@ use crate::view::scene::Scene;
 /// The number under which the tool's own things are kept on the graphics card.
 const OWN: u64 = u64::MAX;
 
-/// Collects what is drawn, with one key each.
-struct Drawing {
-    overlay: Overlay,
-    origin: DVec3,
-    part: u32,
-}
-
-impl Drawing {
-    fn key(&mut self) -> Key {
-        self.part += 1;
-        Key::new(OWN, self.part)
-    }
-
-    fn line(&mut self, points: impl IntoIterator<Item = DVec3>, width: f32, color: Color, dash: Dash, hidden: Hidden) {
-        let mut lines = LineData::new(self.origin);
-        lines.push(points);
-        self.lines(lines, width, color, dash, hidden);
-    }
-
-    fn lines(&mut self, lines: LineData, width: f32, color: Color, dash: Dash, hidden: Hidden) {
-        if lines.ends.is_empty() {
-            return;
-        }
-        let item = LineItem {
-            key: self.key(),
-            revision: self.overlay.revision,
-            lines: Arc::new(lines),
-            style: LineStyle { width, color, dash, hidden },
-            role: LineRole::Curve,
-            emphasis: Emphasis::Normal,
-            sectioned: false,
-        };
-        self.overlay.lines.push(item);
-    }
-
-    fn mesh(
-        &mut self,
-        points: &[DVec3],
-        normals: Vec<[f32; 3]>,
-        triangles: Vec<[u32; 3]>,
-        color: Color,
-        field: Option<Field>,
-    ) {
-        if triangles.is_empty() {
-            return;
-        }
-        let positions = points.iter().map(|p| (*p - self.origin).as_vec3().to_array()).collect();
-        let mesh = MeshData { origin: self.origin, positions, normals, triangles };
-        let item = MeshItem {
-            key: self.key(),
-            revision: self.overlay.revision,
-            mesh: Arc::new(mesh),
-            color,
-            emphasis: Emphasis::Normal,
-            field,
-            sectioned: true,
-        };
-        self.overlay.meshes.push(item);
-    }
-
-    fn grid(&mut self, grid: &Grid<DVec3>, color: Color) {
-        let row = (grid.m() + 1) as u32;
-        let triangles = cells(grid.m(), grid.n()).flat_map(|(i, j)| {
-            let a = j * row + i;
-            [[a, a + 1, a + row + 1], [a, a + row + 1, a + row]]
-        });
-        self.mesh(grid.values(), Vec::new(), triangles.collect(), color, None);
-    }
-
-    fn glyphs(&mut self, glyphs: GlyphData, hidden: Hidden) {
-        if glyphs.glyphs.is_empty() {
-            return;
-        }
-        let key = self.key();
-        self.overlay.glyphs.push(GlyphItem {
-            key,
-            revision: self.overlay.revision,
-            glyphs: Arc::new(glyphs),
-            hidden,
-            sectioned: false,
-        });
-    }
+fn add_grid(d: &mut Sketch, grid: &Grid<DVec3>, color: Color) {
+    let row = (grid.m() + 1) as u32;
+    let triangles = cells(grid.m(), grid.n()).flat_map(|(i, j)| {
+        let a = j * row + i;
+        [[a, a + 1, a + row + 1], [a, a + row + 1, a + row]]
+    });
+    d.mesh(grid.values(), Vec::new(), triangles.collect(), color, None);
 }
 
 fn cells(m: usize, n: usize) -> impl Iterator<Item = (u32, u32)> {
@@ -155,16 +77,14 @@ impl PatchSession {
     pub fn overlay(&self, scene: &Scene, dark: bool) -> Overlay {
         let t = theme::tokens(dark);
         let bounds = scene.items().first().map(|i| i.bounds.center());
-        let overlay = Overlay { revision: self.revision << 1 | u64::from(dark), mute: true, ..Overlay::default() };
-        let mut d = Drawing { overlay, origin: bounds.filter(|p| p.is_finite()).unwrap_or_default(), part: 0 };
+        let revision = self.revision << 1 | u64::from(dark);
+        let mut d = Sketch::new(OWN, revision, bounds.unwrap_or_default());
         let picking = matches!(self.tool.stage(), Stage::Side(_));
-        d.overlay.iso_lines = picking;
-        d.overlay.ghost = self.tool.stage() == Stage::Result;
         if picking {
             self.candidates(&mut d, scene);
         }
         self.preview_surface(&mut d, t);
-        self.result_surface(&mut d, t);
+        self.result_surface(&mut d, t, revision);
         for (_, points) in self.tool.reusable() {
             d.line(points, 2.0, linear(t.accent), Dash::LONG, Hidden::Dashed);
         }
@@ -201,20 +121,16 @@ impl PatchSession {
         if picking {
             self.cursor(&mut d, scene, t);
         }
-        d.overlay
+        let ghost = self.tool.stage() == Stage::Result;
+        Overlay { revision, mute: true, iso_lines: picking, ghost, ..Overlay::of(d) }
     }
 
     /// The edges of the model by what they are, in colour and stroke.
-    fn candidates(&self, d: &mut Drawing, scene: &Scene) {
+    fn candidates(&self, d: &mut Sketch, scene: &Scene) {
         let Some(edges) = self.edges() else { return };
         for kind in EdgeKind::ALL {
-            let mut lines = LineData::new(d.origin);
-            for piece in edges.pieces.iter().filter(|p| p.kind == kind) {
-                let points = stretch(scene, piece);
-                if points.len() > 1 {
-                    lines.push(points);
-                }
-            }
+            let pieces = edges.pieces.iter().filter(|p| p.kind == kind);
+            let lines = pieces.map(|piece| stretch(scene, piece)).filter(|points| points.len() > 1);
             let ([r, g, b], pattern) = kind.style();
             let [r, g, b] = colormap::linear([r, g, b]);
             let (width, dash) = match pattern {
@@ -223,11 +139,11 @@ impl PatchSession {
                 LinePattern::Double => (4.0, Dash::Double),
                 LinePattern::ShortDash => (3.0, Dash::SHORT),
             };
-            d.lines(lines, width, [r, g, b, 1.0], dash, Hidden::Dashed);
+            d.polylines(lines, LineStyle { width, color: [r, g, b, 1.0], dash, hidden: Hidden::Dashed });
         }
     }
 
-    fn cursor(&self, d: &mut Drawing, scene: &Scene, t: &theme::Tokens) {
+    fn cursor(&self, d: &mut Sketch, scene: &Scene, t: &theme::Tokens) {
         let current = match self.tool.stage() {
             Stage::Side(side) => linear(t.sides[side]),
             _ => linear(t.accent),
@@ -257,7 +173,7 @@ impl PatchSession {
         }
     }
 
-    fn preview_surface(&self, d: &mut Drawing, t: &theme::Tokens) {
+    fn preview_surface(&self, d: &mut Sketch, t: &theme::Tokens) {
         let Some(preview) = self.tool.preview() else { return };
         let row = (crate::view::patch_tool::preview::CELLS + 1) as u32;
         let folded: Vec<[u32; 3]> = preview
@@ -280,7 +196,7 @@ impl PatchSession {
                 let ghost = Grid::from_fn(sketch.grid.m(), sketch.grid.n(), |i, j| {
                     sketch.grid[(i, j)] + sketch.normals[(i, j)] * (side * sketch.slab)
                 });
-                d.grid(&ghost, with_alpha(linear(t.warn), 0.2));
+                add_grid(d, &ghost, with_alpha(linear(t.warn), 0.2));
             }
         }
         let Some(samples) = &sketch.samples else { return };
@@ -305,11 +221,11 @@ impl PatchSession {
         d.glyphs(dots, Hidden::OnTop);
     }
 
-    fn result_surface(&self, d: &mut Drawing, t: &theme::Tokens) {
+    fn result_surface(&self, d: &mut Sketch, t: &theme::Tokens, revision: u64) {
         let Some(shown) = self.shown.as_ref().filter(|_| self.tool.stage() == Stage::Result) else { return };
         let SurfaceMesh { points, normals, triangles, .. } = &shown.mesh;
         let field = self.tool.shows_deviation().then(|| Field {
-            revision: d.overlay.revision,
+            revision,
             values: Arc::new(shown.deviation.values.clone()),
             scale: Arc::new(self.scale()),
         });

@@ -35,8 +35,16 @@ impl Editor {
         panels::heading(ui, "Next");
         let next = match (self.document().entities().is_empty(), self.selection.is_empty()) {
             (true, _) => &[Action::Open, Action::OpenExample][..],
-            (_, true) => &[Action::PatchTool, Action::Section, Action::FrameAll],
-            (_, false) => &[Action::PatchTool, Action::FrameSelection, Action::Isolate, Action::Hide, Action::Deselect],
+            (_, true) => &[Action::PatchTool, Action::IntersectTool, Action::Section, Action::FrameAll],
+            (_, false) => &[
+                Action::PatchTool,
+                Action::IntersectTool,
+                Action::SelfIntersectTool,
+                Action::FrameSelection,
+                Action::Isolate,
+                Action::Hide,
+                Action::Deselect,
+            ],
         };
         for &action in next {
             let info = actions::info(action);

@@ -42,6 +42,22 @@ pub struct Overlay {
     pub glyphs: Vec<GlyphItem>,
 }
 
+impl Overlay {
+    /// What a sketch holds.
+    pub fn of(sketch: render::Sketch) -> Self {
+        let mut overlay = Self::default();
+        overlay.add(sketch);
+        overlay
+    }
+
+    /// Adds what a sketch holds.
+    pub fn add(&mut self, sketch: render::Sketch) {
+        self.meshes.extend(sketch.meshes);
+        self.lines.extend(sketch.lines);
+        self.glyphs.extend(sketch.glyphs);
+    }
+}
+
 /// Everything that decides what a frame looks like.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stamp {

@@ -1,0 +1,175 @@
+//! The intersection tools in the window, driven by simulated mouse and keys: intersect, look, keep the curves; the cylinder demo follows its slider; a surface is intersected with itself.
+#![cfg(feature = "editor")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test helper may stop the test")]
+
+#[path = "support/window.rs"]
+mod window;
+
+use std::sync::Arc;
+
+use egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable;
+use glam::DVec3;
+use patchwright::kernel::geom::{Knots, Surface};
+use patchwright::model::document::{Document, Shape, Unit};
+use patchwright::ui::Options;
+use patchwright::view::uv::{UvGlyph, UvMark, UvShape};
+use window::*;
+
+const NONE: Modifiers = Modifiers::NONE;
+
+/// Clicks a surface in the outliner's place: the set is filled through the selection.
+fn select(window: &mut Window, names: &[&str]) {
+    let ids: Vec<_> = {
+        let document = window.state().editor.document();
+        names.iter().map(|n| document.entities().iter().find(|e| e.name == *n).unwrap().id).collect()
+    };
+    window.state_mut().editor.selection.set(ids);
+    settle(window);
+}
+
+/// A bowl and four walls around a square of it. The walls do not quite meet: curves on walls that do would be one curve.
+fn walled_bowl() -> Document {
+    let knots = || Knots::bezier(2, -1.0, 1.0).unwrap();
+    let square = [1.0, -1.0, 1.0];
+    let at = |k: usize| {
+        let (i, j) = (k % 3, k / 3);
+        DVec3::new(i as f64 - 1.0, j as f64 - 1.0, 0.2 * (square[i] + square[j]))
+    };
+    let bowl = Surface::new(knots(), knots(), (0..9).map(at).collect(), None).unwrap();
+    let mut document = Document::new(Unit::Metre);
+    document.add("bowl", Shape::Surface(Arc::new(bowl)), None);
+    let ring = [(-0.6, -0.5), (0.6, -0.5), (0.6, 0.5), (-0.6, 0.5), (-0.6, -0.5)];
+    for (k, pair) in ring.windows(2).enumerate() {
+        let [a, b] = [pair[0], pair[1]].map(|(x, y)| DVec3::new(x, y, 0.0));
+        let (a, b) = (a.lerp(b, 2e-4), b.lerp(a, 2e-4));
+        let ends = [a, b, a, b].map(|p| p - DVec3::Z * 0.3);
+        let ends = [ends[0], ends[1], ends[2] + DVec3::Z * 0.8, ends[3] + DVec3::Z * 0.8];
+        document.add(format!("wall {k}"), Shape::Surface(Arc::new(Surface::bilinear(ends).unwrap())), None);
+    }
+    document
+}
+
+#[test]
+fn curves_are_found_chosen_kept_and_undone() {
+    let mut window = opened("surfaces_with_gap.igs");
+    window.state_mut().editor.show_document(walled_bowl(), None, "walled bowl".to_owned(), true);
+    settle(&mut window);
+    key(&mut window, NONE, Key::Num7);
+    select(&mut window, &["bowl", "wall 0", "wall 1", "wall 2", "wall 3"]);
+    key(&mut window, NONE, Key::I);
+    assert_eq!(prompt(&window), "Intersect · Intersect the two sets");
+    key(&mut window, NONE, Key::Enter);
+    assert!(window.query_by_label_contains("Complete: no branch is missing").is_some(), "{}", prompt(&window));
+    assert!(window.state().editor.has_found_curves());
+    key(&mut window, NONE, Key::N);
+    assert_eq!(prompt(&window), "Intersect · Curve 1 chosen");
+    assert!(window.query_by_label_contains("Signed gap").is_some());
+    key(&mut window, NONE, Key::Escape);
+    assert_eq!(prompt(&window), "Intersect · Click a curve or a point");
+    key(&mut window, NONE, Key::K);
+    let curves = |window: &Window| window.state().editor.document().curves().count();
+    let found = window.state().editor.found_intersection().unwrap().result.curves.len();
+    assert_eq!(curves(&window), found);
+
+    key(&mut window, Modifiers::COMMAND, Key::Z);
+    assert_eq!(curves(&window), 0, "one undo takes all kept curves back");
+}
+
+#[test]
+fn the_two_cylinders_follow_the_slider() {
+    let mut window = window(builder(), Options::default());
+    window.state_mut().editor.start_coaxial_demo();
+    settle(&mut window);
+    let crossings = |window: &Window| {
+        let found = window.state().editor.found_intersection().unwrap();
+        assert!(found.result.complete);
+        found.result.junctions.len()
+    };
+    assert_eq!(crossings(&window), 2);
+    picture(&mut window, "coaxial_1deg");
+    for degrees in [0.3, 0.01, 10.0] {
+        window.state_mut().editor.turn_cylinder(degrees);
+        settle(&mut window);
+        assert_eq!(crossings(&window), 2, "{degrees}");
+    }
+    assert_eq!(window.state().editor.history.steps().1, 1, "the drag is one step");
+    key(&mut window, NONE, Key::G);
+    picture(&mut window, "coaxial_gap");
+    key(&mut window, Modifiers::COMMAND, Key::Z);
+    assert!(window.query_by_label_contains("The model has changed").is_some());
+}
+
+#[test]
+fn all_pairs_of_what_is_visible() {
+    let mut window = opened("intersecting_surfaces.igs");
+    key(&mut window, Modifiers::COMMAND | Modifiers::SHIFT, Key::I);
+    assert!(window.state().editor.found_intersection().is_some_and(|f| f.result.complete));
+    assert!(window.state().editor.has_found_curves());
+}
+
+#[test]
+fn a_surface_without_self_intersection_is_proved_free() {
+    let mut window = opened("surfaces_with_gap.igs");
+    select(&mut window, &["left panel"]);
+    key(&mut window, Modifiers::SHIFT, Key::I);
+    assert_eq!(prompt(&window), "Self-intersection · Find where it meets itself");
+    key(&mut window, NONE, Key::Enter);
+    assert!(window.query_by_label_contains("No self-intersection").is_some(), "{}", prompt(&window));
+    picture(&mut window, "self_free");
+}
+
+#[test]
+fn esc_leaves_step_by_step_and_changes_nothing() {
+    let mut window = opened("intersecting_surfaces.igs");
+    key(&mut window, NONE, Key::I);
+    assert_eq!(prompt(&window), "Intersect · Click a surface for the first set");
+    key(&mut window, NONE, Key::Enter);
+    assert!(prompt(&window).starts_with("Intersect"), "Enter says what is missing and stays");
+    key(&mut window, NONE, Key::Escape);
+    assert!(prompt(&window).starts_with("Select"), "{}", prompt(&window));
+    assert!(!window.state().editor.history.is_dirty());
+}
+
+#[test]
+fn a_plane_is_swept_through_the_miter_point_of_the_cross_cap() {
+    let mut window = opened("surfaces_with_gap.igs");
+    window.state_mut().editor.open_example("cross_cap");
+    settle(&mut window);
+    assert_eq!(prompt(&window), "Self-intersection · Miter point 1 chosen");
+    let found = window.state().editor.found_intersection().unwrap();
+    assert_eq!((found.result.curves.len(), found.result.miters.len(), found.result.complete), (1, 1, true));
+    window.get_by_label("Cut with a plane").click();
+    settle(&mut window);
+    assert!(window.query_by_label_contains("Elliptic: a figure-8").is_some());
+    window.get_by_label("Through the point").click();
+    settle(&mut window);
+    assert!(window.query_by_label_contains("Elliptic: the point alone").is_some());
+}
+
+/// Both preimages are in the uv view; the cursor's partners move with it.
+#[test]
+fn the_uv_view_shows_both_domains() {
+    let mut window = opened("intersecting_surfaces.igs");
+    select(&mut window, &["left panel", "right panel"]);
+    key(&mut window, NONE, Key::I);
+    key(&mut window, NONE, Key::Enter);
+    key(&mut window, NONE, Key::U);
+    key(&mut window, NONE, Key::N);
+    let pictures = window.state().editor.tool_uv();
+    assert_eq!(pictures.len(), 2);
+    let cursors = |window: &Window| -> Vec<glam::DVec2> {
+        let pictures = window.state().editor.tool_uv();
+        let ring = |m: &UvMark| match m.shape {
+            UvShape::Point(at, UvGlyph::Ring) => Some(at),
+            _ => None,
+        };
+        pictures.iter().filter_map(|p| p.marks.iter().find_map(ring)).collect()
+    };
+    let before = cursors(&window);
+    assert_eq!(before.len(), 2);
+    window.state_mut().editor.put_intersection_cursor(0.25);
+    settle(&mut window);
+    let after = cursors(&window);
+    assert!(before.iter().zip(&after).all(|(a, b)| a.distance(*b) > 1e-3), "{before:?} {after:?}");
+}
