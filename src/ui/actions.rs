@@ -60,6 +60,7 @@ pub enum Action {
     SelfIntersectTool,
     SearchSelfIntersections,
     KeepCurves,
+    ExportCurves,
     CoaxialDemo,
     MiterDemo,
     CancelJobs,
@@ -380,6 +381,14 @@ pub const ACTIONS: &[Info] = &[
         "Keep curves",
         key(NONE, Key::K),
         "Make the curves that were found free curves of the model, to be picked as sides of a patch",
+    ),
+    entry(
+        Action::ExportCurves,
+        Analyse,
+        2,
+        "Export curves…",
+        None,
+        "Write the curves that were found, in space and on their surfaces",
     ),
     entry(
         Action::CoaxialDemo,

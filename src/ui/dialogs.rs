@@ -33,6 +33,8 @@ pub enum SaveWhat {
     Model,
     /// The patch specification.
     Spec,
+    /// The curves that the intersection tool has found.
+    Curves,
 }
 
 /// What waits for unsaved changes to be settled.
@@ -295,6 +297,7 @@ impl Dialog {
                 ui.heading(match what {
                     SaveWhat::Model => "Save as",
                     SaveWhat::Spec => "Save patch specification",
+                    SaveWhat::Curves => "Export curves",
                 });
                 ui.add_space(6.0);
                 let enter = field.show(ui, true);
@@ -302,6 +305,7 @@ impl Dialog {
                 ui.small(match what {
                     SaveWhat::Model => "The extension says the format: .patchwright.ron keeps everything; .igs holds the surfaces and patches as B-splines for other programs; .stl, .obj and .xyz hold triangles or grids (Export has the choices)",
                     SaveWhat::Spec => "RON, for patchwright heal FILE --patches",
+                    SaveWhat::Curves => "Cubic B-splines: .igs with their surfaces and the curves on these; .patchwright.ron without the curves on surfaces",
                 });
                 let path = field.path();
                 buttons(ui, |ui| {

@@ -199,7 +199,9 @@ impl Editor {
                 let shown = self.document().entities().iter().filter(|e| e.visible && e.surface().is_some());
                 need(shown.count() > 1, "fewer than two surfaces are visible")
             }
-            Action::KeepCurves => need(self.has_found_curves(), "no intersection curves have been found"),
+            Action::KeepCurves | Action::ExportCurves => {
+                need(self.has_found_curves(), "no intersection curves have been found")
+            }
             Action::FrameAll => need(!self.document().entities().is_empty(), "the model is empty"),
             Action::FrameSelection => need(selected, "nothing is selected"),
             Action::CancelJobs => need(!self.jobs.active().is_empty(), "nothing is running"),
@@ -352,6 +354,7 @@ impl Editor {
             Action::SelfIntersectTool => self.start_intersect(Task::Itself),
             Action::SearchSelfIntersections => self.search_self_intersections(),
             Action::KeepCurves => self.keep_curves(),
+            Action::ExportCurves => self.ask_where(SaveWhat::Curves, None),
             Action::CoaxialDemo => self.start_coaxial_demo(),
             Action::MiterDemo => self.open_example(crate::model::examples::cross_cap::NAME),
             Action::CancelJobs => {

@@ -10,6 +10,7 @@ use crate::model;
 use crate::model::document::Document;
 use crate::model::history::History;
 use crate::model::replay::spec_of;
+use crate::view::intersection::{Found, keep};
 use crate::work::{Lane, Outcome, Ticket};
 
 /// What reading some files came to.
@@ -92,6 +93,7 @@ impl Editor {
         let path = match what {
             SaveWhat::Model => self.beside_source(&format!("healed.{}", io::PROJECT_EXTENSION)),
             SaveWhat::Spec => self.beside_source("patches.ron"),
+            SaveWhat::Curves => self.beside_source("curves.igs"),
         };
         self.dialog = Some(Dialog::Save(what, PathField::new(path), then));
     }
@@ -108,11 +110,13 @@ impl Editor {
     /// Writes to a file.
     pub fn save_to(&mut self, what: SaveWhat, path: PathBuf, then: Option<Then>) {
         let (document, revision) = (self.document().clone(), self.history.revision());
+        let found = self.found_intersection().cloned();
         let name = format!("Save {}", file_name(&path));
         let ticket = self.jobs.spawn(Lane::Heavy, name, path.display().to_string(), move |_| {
             let result = match what {
                 SaveWhat::Model => io::save(&path, &document, &SaveOptions::default()).map_err(|e| e.to_string()),
                 SaveWhat::Spec => write_spec(&path, &document),
+                SaveWhat::Curves => write_curves(&path, found.as_deref(), document.unit),
             };
             Written { path, what, revision, result }
         });
@@ -266,6 +270,19 @@ fn write_spec(path: &Path, document: &Document) -> Result<Saved, String> {
     let spec = spec_of(document).ok_or("there are no patches to write a specification of")?;
     io::save_spec(path, &spec).map_err(|e| e.to_string())?;
     Ok(Saved { entities: document.patches().count(), ..Saved::default() })
+}
+
+/// Writes the curves of an intersection; as IGES with the curves on surfaces.
+fn write_curves(path: &Path, found: Option<&Found>, unit: crate::model::document::Unit) -> Result<Saved, String> {
+    let Some(found) = found else { return Err("the result is gone; compute it again".to_owned()) };
+    let mut traces = keep::traces(found, unit);
+    let saved = match io::Format::of_name(path) {
+        Some(io::Format::Iges) => io::save_iges(path, &traces.document, &traces.traces),
+        _ => io::save(path, &traces.document, &SaveOptions::default()),
+    };
+    let mut saved = saved.map_err(|e| e.to_string())?;
+    saved.notes.append(&mut traces.notes);
+    Ok(saved)
 }
 
 /// The bundled examples: names and what each shows.

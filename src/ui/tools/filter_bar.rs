@@ -45,6 +45,9 @@ impl Editor {
                 let wants = session.tool.wants_point();
                 (Filter { points: wants, ..session.tool.filter() }, wants && session.snaps.iter().any(|on| *on))
             }
+            // A result is clicked itself, not the model under it.
+            Tool::Intersect(session) if session.found.is_some() => (Filter::NONE, false),
+            Tool::Intersect(_) => (Filter::SURFACES, false),
         };
         if possible == Filter::NONE || self.document().entities().is_empty() {
             return;

@@ -10,10 +10,12 @@ use super::Tool;
 use super::intersect_plane::PlaneDemo;
 use super::intersect_uv::UvShown;
 use crate::kernel::geom::Surface;
+use crate::kernel::ssi::{Tangency, tangency};
 use crate::model::command::Command;
 use crate::model::document::EntityId;
 use crate::model::examples::{coaxial, cross_cap};
 use crate::render::Sketch;
+use crate::view::intersection::biarcs::{Biarcs, biarcs};
 use crate::view::intersection::contact::{Contact, contact};
 use crate::view::intersection::gap::{FieldMesh, area_elements, gaps};
 use crate::view::intersection::keep::{self, Kept};
@@ -69,6 +71,10 @@ pub struct IntersectSession {
     pub exaggeration: f64,
     /// Draws the tori and normals at the cursor.
     pub tori: bool,
+    /// The tori's binormals and the exact collinear-normal point that they lead to, while the tori are drawn.
+    pub tangency: Option<Tangency>,
+    /// The chosen curve as biarcs.
+    pub biarcs: Latest<Result<Biarcs, String>>,
     /// Curves that are being fitted to be kept.
     pub keeping: Option<Ticket<Kept>>,
     /// Chooses the first miter point as soon as it is found.
@@ -120,6 +126,8 @@ impl IntersectSession {
             decades: 6,
             exaggeration: 0.0,
             tori: false,
+            tangency: None,
+            biarcs: Latest::default(),
             keeping: None,
             shows_miter: false,
             demo: PlaneDemo::default(),
@@ -181,7 +189,18 @@ impl IntersectSession {
             };
             self.contact = at.map(|(a, uv, b, st)| contact(found, a, uv, b, st));
         }
+        self.look_at_tangency();
         self.cursor_revision = fresh();
+    }
+
+    /// Looks for the binormals at the cursor, while they are drawn.
+    pub fn look_at_tangency(&mut self) {
+        let (Some(found), Some(Ok(c)), true) = (&self.found, &self.contact, self.tori) else {
+            self.tangency = None;
+            return;
+        };
+        let surfaces = found.surface(c.a.number).zip(found.surface(c.b.number));
+        self.tangency = surfaces.and_then(|(a, b)| tangency(a, b, c.a.uv, c.b.uv));
     }
 
     /// Takes a result over. What was chosen is looked for no longer: numbers mean something else now.
@@ -197,6 +216,7 @@ impl IntersectSession {
             }
         }
         self.focus = Focus::default();
+        self.biarcs.clear();
         self.demo = PlaneDemo::default();
         self.put_cursor(None);
         self.changed();
@@ -210,6 +230,7 @@ impl IntersectSession {
         self.shaded.clear();
         self.field = FieldKind::None;
         self.focus = Focus::default();
+        self.biarcs.clear();
         self.demo = PlaneDemo::default();
         self.put_cursor(None);
         self.changed();
@@ -271,7 +292,7 @@ impl Editor {
     /// Takes over what the tool's workers have made.
     pub fn poll_intersect(&mut self) {
         let Tool::Intersect(session) = &mut self.tool else { return };
-        if session.shaded.poll() | session.demo.section.poll() {
+        if session.shaded.poll() | session.demo.section.poll() | session.biarcs.poll() {
             session.changed();
         }
         if session.live.poll() {
@@ -499,6 +520,18 @@ impl Editor {
             [] if count > 0 => self.say(text),
             notes => self.warn(format!("{text}; {}", notes.join("; "))),
         }
+    }
+
+    /// Fits biarcs to the chosen curve, or forgets them.
+    pub fn fit_biarcs(&mut self, on: bool) {
+        let Tool::Intersect(session) = &mut self.tool else { return };
+        let (Some(found), Some(k)) = (session.found.clone(), session.chosen_curve()) else { return };
+        if on {
+            session.biarcs.request(&mut self.jobs, "Fit biarcs", "", move |_| biarcs(&found, k));
+        } else {
+            session.biarcs.clear();
+        }
+        session.changed();
     }
 
     /// Whether there are curves to keep or to write.

@@ -47,6 +47,7 @@ impl IntersectSession {
                         d.polylines(hatch::region(found, k), style);
                     }
                     d.intersection(&Drawing::new(found, self.focus, dark), strength, dark);
+                    self.biarc_joints(&mut d, t);
                     self.demo.draw(&mut d, t);
                 }
             }
@@ -130,6 +131,19 @@ impl IntersectSession {
         !meshes.is_empty()
     }
 
+    /// Where the biarcs of the chosen curve join.
+    fn biarc_joints(&self, d: &mut Sketch, t: &Tokens) {
+        let Some(Ok(fit)) = self.biarcs.value() else { return };
+        if self.chosen_curve() != Some(fit.curve) {
+            return;
+        }
+        let mut glyphs = GlyphData::new(d.origin);
+        for joint in &fit.joints {
+            glyphs.push(*joint, GlyphShape::Round, 6.0, linear(t.text[2]));
+        }
+        d.glyphs(glyphs, Hidden::OnTop);
+    }
+
     /// The cursor, and the tori and normals there.
     fn cursor_marks(&self, d: &mut Sketch, t: &Tokens) {
         let Some(found) = &self.found else { return };
@@ -155,6 +169,21 @@ impl IntersectSession {
             d.glyphs(arrow, Hidden::OnTop);
         }
         d.line([contact.a.p, contact.b.p], 4.0, linear(t.warn), Dash::SHORT, Hidden::OnTop);
+        let Some(tangency) = &self.tangency else { return };
+        let reach = 1.5 * contact.a.torus.half[0].max(contact.a.torus.half[1]);
+        // Of the at most eight binormals only those through the drawn patches mean something here.
+        for line in &tangency.binormals {
+            let foot = line.on[0] + line.direction * (contact.a.p - line.on[0]).dot(line.direction);
+            if foot.distance(contact.a.p) < reach {
+                let [from, to] = [-1.0, 1.0].map(|s| foot + line.direction * (s * reach));
+                d.line([from, to], 1.5, linear(t.text[2]), Dash::LONG, Hidden::OnTop);
+            }
+        }
+        if let Some(point) = &tangency.point {
+            let mut glyphs = GlyphData::new(d.origin);
+            glyphs.push(point.xyz, GlyphShape::Diamond, 11.0, linear(t.warn));
+            d.glyphs(glyphs, Hidden::OnTop);
+        }
     }
 }
 

@@ -29,6 +29,7 @@ enum Ask {
     Forget,
     Leave,
     Turn(f64),
+    Biarcs(bool),
     Act(Action),
 }
 
@@ -76,6 +77,7 @@ impl Editor {
                 Ask::Forget => session.forget(),
                 Ask::Leave => self.leave_tool(),
                 Ask::Turn(degrees) => self.turn_cylinder(degrees),
+                Ask::Biarcs(on) => self.fit_biarcs(on),
                 Ask::Act(action) => self.perform(&ctx, action),
             }
         }
@@ -271,6 +273,10 @@ fn result(
         if ui.add_enabled(can_keep, Button::new(name)).on_hover_text(help).clicked() {
             asks.push(Ask::Act(Action::KeepCurves));
         }
+        let help = "Write them as IGES with their surfaces and the curves on these, or as a project";
+        if ui.add_enabled(can_keep, Button::new("Export…")).on_hover_text(help).clicked() {
+            asks.push(Ask::Act(Action::ExportCurves));
+        }
         if ui.button("Again").on_hover_text("Enter").clicked() {
             asks.push(Ask::Run);
         }
@@ -281,6 +287,7 @@ fn result(
     ui.add_space(6.0);
     rows(ui, session, found, &write, asks);
     cursor(ui, session, found, unit, gap_tol);
+    biarcs(ui, session, unit, asks);
     fields(ui, session, asks);
 }
 
@@ -386,6 +393,44 @@ fn cursor(ui: &mut Ui, session: &mut IntersectSession, found: &Found, unit: Unit
     let help = "The patches of the two tori that osculate the surfaces at the cursor, and the normals of both";
     if ui.checkbox(&mut session.tori, "Tori and normals at the cursor").on_hover_text(help).changed() {
         session.put_cursor(session.cursor);
+    }
+    if let Some(tangency) = &session.tangency {
+        let text = match (&tangency.point, tangency.family) {
+            (Some(p), _) => format!("Nearest common normal of the surfaces: gap {}", write(p.gap)),
+            (None, true) => "The common normals of the tori form a family here".to_owned(),
+            (None, false) => "The surfaces have no common normal near here".to_owned(),
+        };
+        ui.add(egui::Label::new(RichText::new(text).color(t.text[1]).small()).wrap());
+    }
+    ui.add_space(6.0);
+}
+
+/// The chosen curve as biarcs, on demand.
+fn biarcs(ui: &mut Ui, session: &IntersectSession, unit: Unit, asks: &mut Vec<Ask>) {
+    let Some(curve) = session.chosen_curve() else { return };
+    let t = theme::of(ui);
+    let fit = session.biarcs.value().filter(|fit| fit.as_ref().is_ok_and(|f| f.curve == curve) || fit.is_err());
+    let mut on = fit.is_some() || session.biarcs.is_stale();
+    ui.horizontal(|ui| {
+        let help = "Matched circular arcs in both parameter domains that join with a common tangent, with a bound of \
+                    their error";
+        if ui.checkbox(&mut on, "Biarcs in both domains").on_hover_text(help).changed() {
+            asks.push(Ask::Biarcs(on));
+        }
+        if session.biarcs.is_stale() {
+            ui.spinner();
+        }
+    });
+    match fit {
+        Some(Ok(fit)) => {
+            let within = if fit.within { "" } else { ", more than asked for" };
+            let text = format!("{} biarcs in each domain, within {}{within}", fit.count, length(fit.bound, unit));
+            ui.add(egui::Label::new(RichText::new(text).color(t.text[1]).small()).wrap());
+        }
+        Some(Err(why)) => {
+            ui.add(egui::Label::new(RichText::new(why).color(t.warn)).wrap());
+        }
+        None => {}
     }
     ui.add_space(6.0);
 }

@@ -11,7 +11,7 @@ use super::intersect::IntersectSession;
 use crate::view::intersection::cursor::nearest_uv;
 use crate::view::intersection::domains::{item_of, pictures};
 use crate::view::intersection::{Found, Item, OnCurve};
-use crate::view::uv::UvPicture;
+use crate::view::uv::{UvGlyph, UvInk, UvMark, UvPicture};
 
 /// The pictures and what they were made for: revisions of drawing and cursor, and the theme.
 pub type UvShown = ((u64, u64, bool), Vec<Arc<UvPicture>>);
@@ -29,7 +29,26 @@ impl IntersectSession {
             None => Vec::new(),
         };
         self.demo.mark(self, &mut all);
+        self.biarc_marks(&mut all);
         self.uv = Some((of, all.into_iter().map(Arc::new).collect()));
+    }
+
+    /// The biarcs of the chosen curve, their arcs in two inks by turns.
+    fn biarc_marks(&self, all: &mut [UvPicture]) {
+        let (Some(Ok(fit)), Some(found)) = (self.biarcs.value(), &self.found) else { return };
+        if self.chosen_curve() != Some(fit.curve) {
+            return;
+        }
+        for biarc in &fit.drawn {
+            let entity = found.id(biarc.number);
+            let Some(picture) = all.iter_mut().find(|p| Some(p.entity) == entity) else { continue };
+            for (arc, ink) in biarc.arcs.iter().zip([UvInk::Text, UvInk::Accent]) {
+                picture.marks.push(UvMark::polyline(arc.clone()).ink(ink).width(1.5));
+                if let Some(start) = arc.first() {
+                    picture.marks.push(UvMark::point(*start, UvGlyph::Round).ink(ink).width(4.0));
+                }
+            }
+        }
     }
 
     /// What is shown in the uv view.

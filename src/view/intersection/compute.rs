@@ -7,8 +7,7 @@ use crate::kernel::geom::Surface;
 use crate::kernel::job::Job;
 use crate::kernel::self_ssi::SelfIntersectOptions;
 use crate::kernel::self_ssi::model::{merged, self_intersect_all};
-use crate::kernel::ssi::result::Intersection;
-use crate::kernel::ssi::{SsiOptions, intersect};
+use crate::kernel::ssi::{SsiOptions, intersect, intersect_all};
 use crate::model::document::Document;
 
 /// Everything that a worker needs.
@@ -66,7 +65,7 @@ pub fn compute(request: &Request, job: &Job) -> Result<Found, String> {
     let result = match request.task {
         Task::Sets => intersect(&numbered(&request.sides[0]), &numbered(&request.sides[1]), &options, job)
             .map_err(|e| e.to_string())?,
-        Task::Pairs => pairs(&numbered(&request.sides[0]), &options, job)?,
+        Task::Pairs => intersect_all(&numbered(&request.sides[0]), &options, job).map_err(|e| e.to_string())?,
         Task::Itself => {
             let options = SelfIntersectOptions { tol: request.tol, ..SelfIntersectOptions::default() };
             let surfaces = request.sides[0].iter().filter_map(|&n| Some((n, &request.subjects.get(n)?.surface)));
@@ -82,32 +81,6 @@ pub fn compute(request: &Request, job: &Job) -> Result<Found, String> {
         cancelled: job.is_cancelled(),
         warnings: job.warnings(),
     })
-}
-
-/// Every surface with every later one whose box it meets.
-fn pairs(surfaces: &[(usize, &Surface)], options: &SsiOptions, job: &Job) -> Result<Intersection, String> {
-    let boxes: Vec<_> = surfaces.iter().map(|(_, s)| s.bounds()).collect();
-    let mut list = Vec::new();
-    for i in 0..surfaces.len() {
-        for j in i + 1..surfaces.len() {
-            if boxes[i].overlaps(&boxes[j]) {
-                list.push((i, j));
-            }
-        }
-    }
-    let mut all = Intersection { complete: true, ..Intersection::default() };
-    for (done, &(i, j)) in list.iter().enumerate() {
-        if job.is_cancelled() {
-            all.complete = false;
-            break;
-        }
-        job.phase(&format!("Pair {} of {}", done + 1, list.len()));
-        // A job of its own keeps the progress of one pair from filling the whole bar.
-        let one = intersect(&surfaces[i..=i], &surfaces[j..=j], options, job).map_err(|e| e.to_string())?;
-        all.append(one);
-        job.progress((done + 1) as f64 / list.len() as f64);
-    }
-    Ok(all)
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ use super::Found;
 use crate::kernel::bvh::OsculatingTorus;
 use crate::kernel::geom::Curvature;
 use crate::kernel::geom::closest::{closed_directions, line_from};
+use crate::kernel::ssi::osculating_torus;
 
 /// A torus is drawn over at most this part of the size of the model on each side of the place.
 const REACH: f64 = 0.06;
@@ -80,7 +81,9 @@ impl Local {
         let jet = surface.jet(surface.clamped(uv), 2);
         let curvature = Curvature::of(&jet)?;
         let size = REACH * surface.bounds().diagonal();
-        let torus = torus(jet.p(), &curvature, size);
+        let mut torus = osculating_torus(surface, surface.clamped(uv))?;
+        // It osculates in one point; the patch that is drawn is as large as looks well.
+        torus.half = torus.k.map(|k| size.min(2.0 * (0.5 * ANGLE).tan() / k.abs().max(f64::MIN_POSITIVE)));
         Some(Self { number, uv, p: jet.p(), curvature, torus })
     }
 
@@ -98,22 +101,6 @@ impl Local {
     /// Major and minor radius of the torus, `None` where it is flat in one direction.
     pub fn radii(&self) -> Option<[f64; 2]> {
         self.torus.radii().map(|t| [t.major, t.minor])
-    }
-}
-
-/// The torus that osculates in a point, over a patch as large as looks well.
-fn torus(point: DVec3, curvature: &Curvature, size: f64) -> OsculatingTorus {
-    let half = curvature.k.map(|k| size.min(2.0 * (0.5 * ANGLE).tan() / k.abs().max(f64::MIN_POSITIVE)));
-    OsculatingTorus {
-        point,
-        e: curvature.e,
-        normal: curvature.normal,
-        k: curvature.k,
-        half,
-        corners: [DVec2::ZERO; 4],
-        // Nothing is claimed of the patch.
-        deviation: f64::INFINITY,
-        normal_sin: f64::INFINITY,
     }
 }
 

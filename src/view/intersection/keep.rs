@@ -1,40 +1,52 @@
-//! Curves of a result as free curves of the document, so that they can be picked as sides of a patch.
+//! Curves of a result as free curves of the document, so that they can be picked as sides of a patch, and as a document of
+//! their own with their curves on surfaces, to be written to a file.
 
 use std::sync::Arc;
 
-use glam::DVec3;
-
 use super::Found;
-use crate::kernel::geom::Curve;
+use crate::kernel::geom::{Curve, Surface};
+use crate::kernel::ssi::fit_splines;
 use crate::kernel::ssi::result::CurveKind;
+use crate::model::document::{Document, Shape, Unit};
+use crate::model::traces::{Traces, traces_of};
 
 /// Curves to be added to a document.
 #[derive(Clone, Debug, Default)]
 pub struct Kept {
     /// Names and curves.
     pub curves: Vec<(String, Arc<Curve>)>,
-    /// What could not be kept; one line each.
+    /// What could not be kept, or not within the tolerance; one line each.
     pub notes: Vec<String>,
 }
 
-/// Names and curves for `Command::AddCurves`. The curves of a result end at junctions, so that each is one piece between two of them.
+/// Cubic B-splines through the curves with these numbers. The curves of a result end at junctions, so that each is one
+/// piece between two of them.
 pub fn curves(found: &Found, which: impl IntoIterator<Item = usize>) -> Kept {
+    let surfaces: Vec<(usize, &Surface)> = found.subjects.iter().map(|s| s.surface.as_ref()).enumerate().collect();
     let mut kept = Kept::default();
     for k in which {
         let Some(curve) = found.result.curves.get(k) else { continue };
-        let mut points: Vec<DVec3> = Vec::with_capacity(curve.points.len());
-        for p in &curve.points {
-            // A point occurs once for each patch where the curve crosses from one to the next.
-            if points.last() != Some(&p.xyz) {
-                points.push(p.xyz);
+        match fit_splines(curve, &surfaces, found.result.tol) {
+            Ok(fit) => {
+                if !fit.within {
+                    kept.notes.push(format!("curve {} follows within {:.1e} only", k + 1, fit.bound));
+                }
+                kept.curves.push((name(found, k), Arc::new(fit.space)));
             }
-        }
-        match Curve::polyline(&points) {
-            Ok(made) => kept.curves.push((name(found, k), Arc::new(made))),
             Err(error) => kept.notes.push(format!("curve {} was left out: {error}", k + 1)),
         }
     }
     kept
+}
+
+/// All curves with their surfaces and the curves on them.
+pub fn traces(found: &Found, unit: Unit) -> Traces {
+    let mut model = Document::new(unit);
+    // The numbers of the result are the places of the surfaces in their document.
+    for subject in &found.subjects {
+        model.add(subject.name.clone(), Shape::Surface(Arc::clone(&subject.surface)), None);
+    }
+    traces_of(&found.result, &model, found.result.tol)
 }
 
 fn name(found: &Found, k: usize) -> String {
@@ -50,6 +62,8 @@ fn name(found: &Found, k: usize) -> String {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
     use crate::view::intersection::testing::{document, graph, met, square};
 
@@ -65,5 +79,15 @@ mod tests {
             let (near, far) = if ends[0].length() < ends[1].length() { (ends[0], ends[1]) } else { (ends[1], ends[0]) };
             assert!(near.length() < 1e-6 && (far.truncate().length() - 2f64.sqrt()).abs() < 1e-6);
         }
+    }
+
+    #[test]
+    fn written_curves_have_one_curve_on_each_surface() {
+        let floor = square(DVec3::Z * 0.25, DVec3::X * 1.5, DVec3::Y * 1.5);
+        let found = met(&document([graph(|x, y| x * x + y * y), floor]));
+        let traces = traces(&found, Unit::Millimetre);
+        assert_eq!((traces.curves.len(), traces.traces.len()), (1, 2));
+        assert_eq!(traces.document.surfaces().count(), 2);
+        assert!(traces.bound <= found.result.tol, "{}", traces.bound);
     }
 }

@@ -14,6 +14,7 @@ use crate::kernel::geom::{Aabb, Surface};
 use crate::kernel::ssi::result::{CurvePoint, Intersection};
 use crate::model::document::{Document, EntityId};
 
+pub mod biarcs;
 pub mod certificate;
 pub mod compute;
 pub mod contact;
