@@ -57,7 +57,7 @@ fn curves_are_found_chosen_kept_and_undone() {
     settle(&mut window);
     key(&mut window, NONE, Key::Num7);
     select(&mut window, &["bowl", "wall 0", "wall 1", "wall 2", "wall 3"]);
-    key(&mut window, NONE, Key::I);
+    key(&mut window, NONE, Key::X);
     assert_eq!(prompt(&window), "Intersect · Intersect the two sets");
     key(&mut window, NONE, Key::Enter);
     assert!(window.query_by_label_contains("Complete: no branch is missing").is_some(), "{}", prompt(&window));
@@ -103,7 +103,7 @@ fn the_two_cylinders_follow_the_slider() {
 #[test]
 fn all_pairs_of_what_is_visible() {
     let mut window = opened("intersecting_surfaces.igs");
-    key(&mut window, Modifiers::COMMAND | Modifiers::SHIFT, Key::I);
+    key(&mut window, Modifiers::COMMAND | Modifiers::SHIFT, Key::X);
     assert!(window.state().editor.found_intersection().is_some_and(|f| f.result.complete));
     assert!(window.state().editor.has_found_curves());
 }
@@ -112,7 +112,7 @@ fn all_pairs_of_what_is_visible() {
 fn a_surface_without_self_intersection_is_proved_free() {
     let mut window = opened("surfaces_with_gap.igs");
     select(&mut window, &["left panel"]);
-    key(&mut window, Modifiers::SHIFT, Key::I);
+    key(&mut window, Modifiers::SHIFT, Key::X);
     assert_eq!(prompt(&window), "Self-intersection · Find where it meets itself");
     key(&mut window, NONE, Key::Enter);
     assert!(window.query_by_label_contains("No self-intersection").is_some(), "{}", prompt(&window));
@@ -122,7 +122,7 @@ fn a_surface_without_self_intersection_is_proved_free() {
 #[test]
 fn esc_leaves_step_by_step_and_changes_nothing() {
     let mut window = opened("intersecting_surfaces.igs");
-    key(&mut window, NONE, Key::I);
+    key(&mut window, NONE, Key::X);
     assert_eq!(prompt(&window), "Intersect · Click a surface for the first set");
     key(&mut window, NONE, Key::Enter);
     assert!(prompt(&window).starts_with("Intersect"), "Enter says what is missing and stays");
@@ -152,7 +152,7 @@ fn a_plane_is_swept_through_the_miter_point_of_the_cross_cap() {
 fn the_uv_view_shows_both_domains() {
     let mut window = opened("intersecting_surfaces.igs");
     select(&mut window, &["left panel", "right panel"]);
-    key(&mut window, NONE, Key::I);
+    key(&mut window, NONE, Key::X);
     key(&mut window, NONE, Key::Enter);
     key(&mut window, NONE, Key::U);
     key(&mut window, NONE, Key::N);

@@ -21,7 +21,7 @@ use crate::view::intersection::{Class, Item, hatch};
 use crate::view::scene::Scene;
 
 /// The number under which the tool's own things are kept on the graphics card.
-const OWN: u64 = u64::MAX - 1;
+const OWN: u64 = u64::MAX - 100;
 /// How strongly a result is drawn that is about to be replaced.
 const STALE: f32 = 0.3;
 
@@ -57,7 +57,7 @@ impl IntersectSession {
         if let Some(drawn) = &self.drawn {
             out.ghost = drawn.shaded;
             if let (true, Some(found), Some((_, meshes))) = (drawn.shaded, &self.found, self.shaded.value()) {
-                out.replaced = meshes.iter().filter_map(|m| found.id(m.number)).collect();
+                out.without = meshes.iter().filter_map(|m| found.id(m.number)).collect();
             }
             out.add(drawn.sketch.clone());
             let mut cursor = Sketch::new(OWN - 1, self.cursor_revision << 1 | u64::from(dark), drawn.sketch.origin);

@@ -112,7 +112,7 @@ impl Editor {
     /// Leaves the active tool.
     pub fn leave_tool(&mut self) {
         match &self.tool {
-            Tool::Select => {}
+            Tool::Select | Tool::Inspect(_) => {}
             Tool::Patch(session) => session.healing.iter().for_each(Ticket::cancel),
             Tool::Intersect(session) => session.running.iter().for_each(Ticket::cancel),
         }
