@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{CliError, Common, Exit};
 use crate::io::{self, ImportReport, Severity};
 use crate::kernel::geom::{Aabb, Knots};
-use crate::kernel::mesh::facets::Facets;
+use crate::kernel::mesh::facets::{FacetCurve, FacetCurveKind, Facets};
 use crate::kernel::mesh::grid::Grid;
 use crate::model::borders::{Meets, borders};
 use crate::model::document::{Document, Entity, Shape};
@@ -121,10 +121,38 @@ struct FacetsInfo {
     non_manifold_edges: usize,
     /// Borders, feature edges and grid lines: what `Chain` of a patch specification counts.
     chains: usize,
+    /// Each of them, with `--all`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    curves: Vec<ChainInfo>,
+}
+
+#[derive(Serialize)]
+struct ChainInfo {
+    name: String,
+    kind: &'static str,
+    points: usize,
+    length: f64,
+    from: [f64; 3],
+    to: [f64; 3],
+}
+
+impl ChainInfo {
+    fn of(chain: &FacetCurve) -> Self {
+        let kind = match chain.kind {
+            FacetCurveKind::Border => "border",
+            FacetCurveKind::Feature => "feature",
+            FacetCurveKind::GridBorder => "grid-border",
+            FacetCurveKind::GridLine => "grid-line",
+        };
+        let [from, to] = chain.curve.ends().map(|p| p.to_array());
+        let points = chain.curve.points();
+        let length = points.windows(2).map(|p| p[0].distance(p[1])).sum();
+        Self { name: chain.name.clone(), kind, points: points.len(), length, from, to }
+    }
 }
 
 impl FacetsInfo {
-    fn of(facets: &Facets) -> Self {
+    fn of(facets: &Facets, all: bool) -> Self {
         let (mesh, defects) = (facets.mesh(), facets.mesh().defects());
         Self {
             counts: facets.grid().map(Grid::counts),
@@ -136,6 +164,7 @@ impl FacetsInfo {
             border_edges: defects.border_edges,
             non_manifold_edges: defects.non_manifold_edges,
             chains: facets.curves().len(),
+            curves: if all { facets.curves().iter().map(ChainInfo::of).collect() } else { Vec::new() },
         }
     }
 
@@ -157,7 +186,7 @@ impl FacetsInfo {
 }
 
 impl EntityInfo {
-    fn of(entity: &Entity, number: usize) -> Self {
+    fn of(entity: &Entity, number: usize, all: bool) -> Self {
         let (kind, knots, rational): (_, Vec<&Knots>, _) = match &entity.shape {
             Shape::Surface(s) => ("surface", s.knots().iter().collect(), s.weights().is_some()),
             Shape::Patch(p) => ("patch", p.surface.knots().iter().collect(), p.surface.weights().is_some()),
@@ -177,7 +206,7 @@ impl EntityInfo {
             spans: knots.iter().map(|k| k.breaks().len() - 1).collect(),
             domain: knots.iter().map(|k| k.domain()).collect(),
             rational,
-            facets: entity.facets().map(|f| FacetsInfo::of(f)),
+            facets: entity.facets().map(|f| FacetsInfo::of(f, all)),
             bounds: Bounds::of(&entity.bounds()),
         }
     }
@@ -220,7 +249,7 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
                 Shape::Mesh(_) | Shape::Block(_) => &mut numbers[3],
             };
             *number += 1;
-            EntityInfo::of(entity, *number - 1)
+            EntityInfo::of(entity, *number - 1, args.all)
         })
         .collect();
     let [surfaces, curves, patches, meshes] = numbers;
@@ -241,7 +270,17 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         ));
     }
     if args.all {
-        entities.iter().for_each(|e| common.say(format!("  {}", e.line())));
+        for entity in &entities {
+            common.say(format!("  {}", entity.line()));
+            for (k, c) in entity.facets.iter().flat_map(|f| f.curves.iter().enumerate()) {
+                let point = |p: [f64; 3]| format!("({}, {}, {})", p[0], p[1], p[2]);
+                let (from, to) = (point(c.from), point(c.to));
+                common.say(format!(
+                    "    chain {k} `{}`: {} points, length {}, {from} to {to}",
+                    c.name, c.points, c.length
+                ));
+            }
+        }
         opened.report.lines.iter().for_each(|line| common.say(format!("  {line}")));
     } else {
         say_report(&opened.report, Severity::Info, common);

@@ -14,6 +14,7 @@ use super::frame::{
     MeshItem, Section,
 };
 use super::theme::Theme;
+use crate::kernel::mesh::tessellate::SurfaceMesh;
 use crate::model::document::EntityId;
 use crate::view::display::Display as Shown;
 use crate::view::scene::{Item, ItemKind, Scene};
@@ -61,6 +62,8 @@ impl Default for Look {
 #[derive(Clone, Debug)]
 struct Dressed {
     revision: u64,
+    /// The triangles that `mesh` was made from.
+    shown: Arc<SurfaceMesh>,
     mesh: Option<Arc<MeshData>>,
     borders: Option<Arc<LineData>>,
     isolines: Option<Arc<LineData>>,
@@ -129,18 +132,20 @@ impl Stage {
         let dressed = match self.dressed.entry(item.id()) {
             std::collections::hash_map::Entry::Occupied(mut slot) => {
                 if slot.get().revision != item.revision {
-                    slot.insert(dress(item.revision, shown));
+                    let old = slot.get();
+                    let mesh = if Arc::ptr_eq(&old.shown, &shown.mesh) { old.mesh.clone() } else { None };
+                    slot.insert(dress(item.revision, shown, mesh));
                 }
                 slot.into_mut()
             }
-            std::collections::hash_map::Entry::Vacant(slot) => slot.insert(dress(item.revision, shown)),
+            std::collections::hash_map::Entry::Vacant(slot) => slot.insert(dress(item.revision, shown, None)),
         };
         let color = color_of(item, at, look);
         let key = |part| Key::new(item.id().0, part);
         if let Some(mesh) = &dressed.mesh {
             frame.meshes.push(MeshItem {
                 key: key(0),
-                revision: item.revision,
+                revision: item.mesh_revision,
                 mesh: mesh.clone(),
                 color,
                 emphasis,
@@ -209,17 +214,21 @@ fn color_of(item: &Item, at: usize, look: &Look) -> Color {
     }
 }
 
-fn dress(revision: u64, shown: &Shown) -> Dressed {
+/// Triangles and lines for a frame; `mesh` where the triangles are those of before.
+fn dress(revision: u64, shown: &Shown, mesh: Option<Arc<MeshData>>) -> Dressed {
     let origin = if shown.bounds.is_empty() { DVec3::ZERO } else { shown.bounds.center() };
     let local = |p: &DVec3| (*p - origin).as_vec3().to_array();
-    let mesh = (!shown.mesh.triangles.is_empty()).then(|| {
-        Arc::new(MeshData {
-            origin,
-            positions: shown.mesh.points.iter().map(local).collect(),
-            normals: shown.mesh.normals.iter().map(|n| n.as_vec3().to_array()).collect(),
-            triangles: shown.mesh.triangles.clone(),
+    let made = || {
+        (!shown.mesh.triangles.is_empty()).then(|| {
+            Arc::new(MeshData {
+                origin,
+                positions: shown.mesh.points.iter().map(local).collect(),
+                normals: shown.mesh.normals.iter().map(|n| n.as_vec3().to_array()).collect(),
+                triangles: shown.mesh.triangles.clone(),
+            })
         })
-    });
+    };
+    let mesh = mesh.or_else(made);
     let lines = |iso: bool| {
         let mut lines = LineData::new(origin);
         for curve in shown.curves.iter().filter(|c| c.curve.is_iso() == iso) {
@@ -227,7 +236,7 @@ fn dress(revision: u64, shown: &Shown) -> Dressed {
         }
         (!lines.ends.is_empty()).then(|| Arc::new(lines))
     };
-    Dressed { revision, mesh, borders: lines(false), isolines: lines(true), cap: None }
+    Dressed { revision, shown: Arc::clone(&shown.mesh), mesh, borders: lines(false), isolines: lines(true), cap: None }
 }
 
 fn cap_line(plane: &SectionPlane, shown: &Shown, item: &Item) -> LineData {

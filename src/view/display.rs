@@ -20,6 +20,8 @@ use crate::model::document::EntityId;
 const MAX_SEGMENTS: usize = 8192;
 /// The most parts along one direction of a surface.
 const MAX_PARTS: usize = 512;
+/// Meshes of more triangles are first shown without what picking needs.
+const QUICK: usize = 300_000;
 /// The most inner grid lines of a block.
 const MAX_GRID_LINES: usize = 768;
 /// The most iso-lines along one direction.
@@ -193,7 +195,7 @@ pub struct Display {
     /// How far triangles and lines are from the truth, in model units.
     pub chord_tol: f64,
     /// The triangles; none for a curve.
-    pub mesh: SurfaceMesh,
+    pub mesh: Arc<SurfaceMesh>,
     /// The tree over them.
     pub tree: TriTree,
     /// Borders first, then iso-lines; or the one free curve.
@@ -204,23 +206,50 @@ pub struct Display {
     pub bounds: Aabb,
     /// Whether a cap made it coarser than `chord_tol`.
     pub capped: bool,
+    /// Whether tree and curves are still to come: the first display of a large mesh.
+    pub quick: bool,
 }
 
 impl Display {
     /// Makes it. Costs about a microsecond a vertex; meant for a worker when the model is large.
     pub fn new(id: EntityId, geometry: &Geometry, chord_tol: f64) -> Self {
+        Self::on(id, geometry, chord_tol, None)
+    }
+
+    /// The first display of a large mesh, which can be seen but not picked; all of it for everything else.
+    pub fn first(id: EntityId, geometry: &Geometry, chord_tol: f64) -> Self {
+        match geometry {
+            Geometry::Facets(facets) if facets.mesh().triangles().len() > QUICK => Self {
+                chord_tol,
+                mesh: Arc::new(shaded(facets.mesh())),
+                tree: TriTree::default(),
+                curves: Vec::new(),
+                segments: SegmentTree::new(Vec::new()),
+                bounds: facets.bounds(),
+                capped: false,
+                quick: true,
+            },
+            _ => Self::new(id, geometry, chord_tol),
+        }
+    }
+
+    /// The whole display, with the triangles of a quick one.
+    pub fn on(id: EntityId, geometry: &Geometry, chord_tol: f64, mesh: Option<Arc<SurfaceMesh>>) -> Self {
         let (mesh, curves, capped) = match geometry {
             Geometry::Surface(surface) => {
                 let (mesh, curves) = surface_display(id, surface, chord_tol);
                 let capped = mesh.capped;
-                (mesh, curves, capped)
+                (Arc::new(mesh), curves, capped)
             }
             Geometry::Curve(curve) => {
                 let (t, capped) = curve_parameters(curve, chord_tol);
                 let points = t.iter().map(|&t| curve.eval(t)).collect();
-                (SurfaceMesh::default(), vec![DisplayCurve { curve: CurveRef::Free(id), points, t }], capped)
+                (Arc::default(), vec![DisplayCurve { curve: CurveRef::Free(id), points, t }], capped)
             }
-            Geometry::Facets(facets) => (shaded(facets.mesh()), facet_curves(id, facets), false),
+            Geometry::Facets(facets) => {
+                let mesh = mesh.unwrap_or_else(|| Arc::new(shaded(facets.mesh())));
+                (mesh, facet_curves(id, facets), false)
+            }
         };
         let bounds = Aabb::of(curves.iter().flat_map(|c| &c.points).chain(&mesh.points).copied());
         let tree = TriTree::new(mesh.points.clone(), &mesh.triangles);
@@ -235,7 +264,7 @@ impl Display {
                 })
             })
             .collect();
-        Self { chord_tol, mesh, tree, curves, segments: SegmentTree::new(segments), bounds, capped }
+        Self { chord_tol, mesh, tree, curves, segments: SegmentTree::new(segments), bounds, capped, quick: false }
     }
 
     /// The number of triangles.

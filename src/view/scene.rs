@@ -54,6 +54,8 @@ pub struct Item {
     pub display: Option<Arc<Display>>,
     /// Changes whenever `display` does and is never used twice; 0 while there is none.
     pub revision: u64,
+    /// The revision at which the triangles of `display` last changed.
+    pub mesh_revision: u64,
 }
 
 impl Item {
@@ -77,6 +79,8 @@ pub struct Request {
     pub geometry: Geometry,
     /// The chord tolerance.
     pub chord_tol: f64,
+    /// The quick display that is to be completed.
+    pub quick: Option<Arc<Display>>,
 }
 
 /// A display that was made.
@@ -90,8 +94,11 @@ pub struct Made {
 impl Request {
     /// Does the work.
     pub fn run(self) -> Made {
-        let display = Arc::new(Display::new(self.id, &self.geometry, self.chord_tol));
-        Made { id: self.id, geometry: self.geometry, display }
+        let display = match self.quick {
+            Some(quick) => Display::on(self.id, &self.geometry, self.chord_tol, Some(Arc::clone(&quick.mesh))),
+            None => Display::first(self.id, &self.geometry, self.chord_tol),
+        };
+        Made { id: self.id, geometry: self.geometry, display: Arc::new(display) }
     }
 }
 
@@ -124,12 +131,12 @@ impl Scene {
                 Shape::Mesh(f) | Shape::Block(f) => (ItemKind::Mesh, counted(2), Geometry::Facets(Arc::clone(f))),
             };
             let kept = old.remove(&entity.id).filter(|item| item.geometry.same(&geometry));
-            let (bounds, display, revision) = match kept {
-                Some(item) => (item.bounds, item.display, item.revision),
-                None => (geometry.bounds(), None, 0),
+            let (bounds, display, revision, mesh_revision) = match kept {
+                Some(item) => (item.bounds, item.display, item.revision, item.mesh_revision),
+                None => (geometry.bounds(), None, 0, 0),
             };
             let entity = Arc::clone(entity);
-            self.items.push(Item { entity, kind, number, geometry, bounds, display, revision });
+            self.items.push(Item { entity, kind, number, geometry, bounds, display, revision, mesh_revision });
         }
         true
     }
@@ -182,9 +189,12 @@ impl Scene {
             let diagonal = item.bounds.diagonal();
             if item.geometry.is_fixed() || !(diagonal > 0.0 && diagonal.is_finite()) {
                 // A shape that is a point, or that is as it is: one display, whatever the view.
-                if item.display.is_none() {
+                let quick = item.display.as_ref().is_some_and(|d| d.quick);
+                if item.display.is_none() || quick {
                     let exact = FINEST * 1e-2 * if diagonal.is_finite() { diagonal } else { 1.0 };
-                    out.push((f64::INFINITY, self.request(item, exact.max(f64::MIN_POSITIVE))));
+                    // What is not seen at all comes before what cannot be picked yet.
+                    let rank = if quick { 1.0 } else { f64::INFINITY };
+                    out.push((rank, self.request(item, exact.max(f64::MIN_POSITIVE))));
                 }
                 continue;
             }
@@ -208,7 +218,8 @@ impl Scene {
     }
 
     fn request(&self, item: &Item, chord_tol: f64) -> Request {
-        Request { id: item.id(), geometry: item.geometry.clone(), chord_tol }
+        let quick = item.display.clone().filter(|d| d.quick);
+        Request { id: item.id(), geometry: item.geometry.clone(), chord_tol, quick }
     }
 
     /// Takes a display over; false when the document no longer has that shape.
@@ -218,7 +229,11 @@ impl Scene {
             return false;
         }
         self.revisions += 1;
+        let same = item.display.as_ref().is_some_and(|d| Arc::ptr_eq(&d.mesh, &made.display.mesh));
         item.revision = self.revisions;
+        if !same {
+            item.mesh_revision = self.revisions;
+        }
         item.display = Some(made.display);
         true
     }

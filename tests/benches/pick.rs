@@ -47,8 +47,12 @@ fn main() {
     let view = View::new(&camera, screen, &scene.bounds());
     let start = Instant::now();
     for item in scene.items().to_vec() {
-        let request =
-            patchwright::view::scene::Request { id: item.id(), geometry: item.geometry.clone(), chord_tol: 1.7e-3 };
+        let request = patchwright::view::scene::Request {
+            id: item.id(),
+            geometry: item.geometry.clone(),
+            chord_tol: 1.7e-3,
+            quick: None,
+        };
         scene.accept(request.run());
     }
     let build = start.elapsed();

@@ -198,10 +198,8 @@ impl Facets {
 
 fn mesh_curves(mesh: &TriMesh) -> Vec<FacetCurve> {
     let mut out = Vec::new();
-    let chains = [
-        (FacetCurveKind::Border, "border", mesh.border_loops()),
-        (FacetCurveKind::Feature, "feature edge", mesh.feature_edges(FEATURE_ANGLE.to_radians())),
-    ];
+    let (border, sharp) = mesh.border_loops_and_feature_edges(FEATURE_ANGLE.to_radians());
+    let chains = [(FacetCurveKind::Border, "border", border), (FacetCurveKind::Feature, "feature edge", sharp)];
     for (kind, word, chains) in chains {
         let mut number = 0;
         for chain in chains {

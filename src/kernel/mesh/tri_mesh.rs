@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use crate::kernel::geom::Aabb;
 
@@ -76,13 +77,6 @@ pub struct EdgeChain {
     pub vertices: Vec<u32>,
     /// Whether it closes.
     pub closed: bool,
-}
-
-/// One undirected edge and the triangles at it.
-struct Edge {
-    vertices: [u32; 2],
-    /// Range in the sorted list of (edge, triangle).
-    uses: Range<usize>,
 }
 
 impl TriMesh {
@@ -175,8 +169,8 @@ impl TriMesh {
         (0..self.triangles.len()).map(|t| 0.5 * self.area_vector(t).length()).sum()
     }
 
-    /// All edges with their triangles, by vertex numbers.
-    fn edges(&self) -> (Vec<Edge>, Vec<([u32; 2], u32)>) {
+    /// All uses of edges by triangles, sorted by edge.
+    fn edge_uses(&self) -> Vec<([u32; 2], u32)> {
         let mut uses: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * self.triangles.len());
         for (t, [a, b, c]) in self.triangles.iter().enumerate() {
             for (p, q) in [(a, b), (b, c), (c, a)] {
@@ -185,15 +179,8 @@ impl TriMesh {
                 }
             }
         }
-        uses.sort_unstable();
-        let mut edges: Vec<Edge> = Vec::new();
-        for (at, (vertices, _)) in uses.iter().enumerate() {
-            match edges.last_mut() {
-                Some(last) if last.vertices == *vertices => last.uses.end = at + 1,
-                _ => edges.push(Edge { vertices: *vertices, uses: at..at + 1 }),
-            }
-        }
-        (edges, uses)
+        uses.par_sort_unstable();
+        uses
     }
 
     /// Counts what is irregular. O(n log n).
@@ -209,8 +196,8 @@ impl TriMesh {
         }
         seen.sort_unstable();
         defects.duplicate = seen.windows(2).filter(|w| w[0] == w[1]).count();
-        for edge in self.edges().0 {
-            match edge.uses.len() {
+        for uses in self.edge_uses().chunk_by(|a, b| a.0 == b.0) {
+            match uses.len() {
                 1 => defects.border_edges += 1,
                 2 => {}
                 _ => defects.non_manifold_edges += 1,
@@ -221,27 +208,35 @@ impl TriMesh {
 
     /// The chains of edges that belong to one triangle only: the borders and holes of the mesh.
     pub fn border_loops(&self) -> Vec<EdgeChain> {
-        let border = self.edges().0.into_iter().filter(|e| e.uses.len() == 1).map(|e| e.vertices);
-        chains(border.collect())
+        self.border_loops_and_feature_edges(std::f64::consts::PI).0
     }
 
     /// The chains of edges at which two triangles' normals differ by more than `angle` (radians), together with
     /// the edges of more than two triangles. Degenerate triangles do not count.
     pub fn feature_edges(&self, angle: f64) -> Vec<EdgeChain> {
-        let (edges, uses) = self.edges();
+        self.border_loops_and_feature_edges(angle).1
+    }
+
+    /// Both in one pass: O(n log n).
+    pub fn border_loops_and_feature_edges(&self, angle: f64) -> (Vec<EdgeChain>, Vec<EdgeChain>) {
         let cosine = angle.cos();
-        let sharp = |edge: &Edge| {
-            let normal = |k: usize| self.area_vector(uses[k].1 as usize).try_normalize();
-            match edge.uses.len() {
-                0 | 1 => false,
-                2 => match (normal(edge.uses.start), normal(edge.uses.start + 1)) {
-                    (Some(a), Some(b)) => a.dot(b) < cosine,
-                    _ => false,
-                },
-                _ => true,
+        let normal = |t: u32| self.area_vector(t as usize).try_normalize();
+        let (mut border, mut sharp) = (Vec::new(), Vec::new());
+        for uses in self.edge_uses().chunk_by(|a, b| a.0 == b.0) {
+            match uses {
+                [(edge, _)] => border.push(*edge),
+                [(edge, s), (_, t)] => {
+                    if let (Some(a), Some(b)) = (normal(*s), normal(*t))
+                        && a.dot(b) < cosine
+                    {
+                        sharp.push(*edge);
+                    }
+                }
+                [(edge, _), ..] => sharp.push(*edge),
+                [] => {}
             }
-        };
-        chains(edges.iter().filter(|e| sharp(e)).map(|e| e.vertices).collect())
+        }
+        (chains(border), chains(sharp))
     }
 }
 

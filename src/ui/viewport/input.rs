@@ -225,7 +225,8 @@ impl Viewport {
     /// The surface parameters of a hit.
     pub fn hit_uv(&self, hit: &PickHit) -> Option<DVec2> {
         match hit.target {
-            Target::Surface { uv, .. } => Some(uv),
+            // A mesh has no parameters.
+            Target::Surface { entity, uv } => self.scene.item(entity)?.entity.surface().map(|_| uv),
             Target::Curve { curve, t } => self.scene.curve_item(&curve)?.geometry.curve_uv(&curve, t),
             Target::Point(_) => None,
         }

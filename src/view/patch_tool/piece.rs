@@ -330,7 +330,9 @@ fn sampled(item: &Item, curve: &CurveRef, range: [f64; 2]) -> Vec<DVec3> {
     let mut breaks = vec![range[0]];
     breaks.extend(knots.into_iter().filter(|t| range[0] < *t && *t < range[1]));
     breaks.push(range[1]);
-    let per_span = PER_SPAN.max(AT_LEAST.div_ceil(breaks.len() - 1));
+    // The chains of a mesh are straight between their points.
+    let least = if item.geometry.is_fixed() { 1 } else { PER_SPAN };
+    let per_span = least.max(AT_LEAST.div_ceil(breaks.len() - 1));
     let at = |t: f64| item.geometry.curve_jet(curve, t).map_or(DVec3::NAN, |jet| jet[0]);
     let mut points = vec![at(range[0])];
     for pair in breaks.windows(2) {
