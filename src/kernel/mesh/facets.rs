@@ -149,24 +149,32 @@ impl Facets {
         Self { mesh, grid: None, bounds, curves: OnceLock::new() }
     }
 
-    /// A structured block: its surface grid, or the six faces of a solid one. Equal points become one vertex.
+    /// A structured block: its surface grid, or the six faces of a solid one, turned outwards. Equal points become one
+    /// vertex.
     pub fn of_block(grid: Grid) -> Result<Self, FacetsError> {
         let mut welder = Welder::with_capacity(grid.points().len().min(1 << 22));
         let mut triangles = Vec::new();
         let too_many = || MeshError::TooMany { got: grid.points().len(), limit: u32::MAX as usize };
-        for face in grid.surfaces() {
+        let faces = grid.surfaces();
+        let solid = faces.len() > 1;
+        for (number, face) in faces.into_iter().enumerate() {
             let part = face.triangulated()?;
+            // The two directions of these faces turn inwards where i, j, k are right-handed.
+            let inwards = solid && matches!(number, 0 | 3 | 4);
             for corners in part.triangles() {
                 let mut own = [0; 3];
                 for (own, &k) in own.iter_mut().zip(corners) {
                     *own = welder.vertex(part.points()[k as usize]).ok_or_else(too_many)?;
                 }
                 if own[0] != own[1] && own[1] != own[2] && own[2] != own[0] {
-                    triangles.push(own);
+                    triangles.push(if inwards { [own[0], own[2], own[1]] } else { own });
                 }
             }
         }
-        let mesh = TriMesh::new(welder.into_points(), triangles)?;
+        let mut mesh = TriMesh::new(welder.into_points(), triangles)?;
+        if solid && mesh.volume() < 0.0 {
+            mesh.reverse();
+        }
         let bounds = mesh.bounds();
         Ok(Self { mesh, grid: Some(grid), bounds, curves: OnceLock::new() })
     }
@@ -366,6 +374,11 @@ mod tests {
         assert_eq!(facets.curves().len(), 48);
         assert_eq!(facets.curves().iter().filter(|c| c.kind == FacetCurveKind::GridBorder).count(), 24);
         assert!((facets.mesh().area() - 2.0 * (6.0 + 8.0 + 12.0)).abs() < 1e-12);
+        // All six faces look outwards, also when k runs down.
+        assert!((facets.mesh().volume() - 24.0).abs() < 1e-12);
+        let down = |k: usize| point(k) * DVec3::new(1.0, 1.0, -1.0);
+        let mirrored = Facets::of_block(Grid::new(counts, (0..60).map(down).collect(), None).unwrap()).unwrap();
+        assert!((mirrored.mesh().volume() - 24.0).abs() < 1e-12);
     }
 
     #[test]

@@ -169,6 +169,21 @@ impl TriMesh {
         (0..self.triangles.len()).map(|t| 0.5 * self.area_vector(t).length()).sum()
     }
 
+    /// The volume inside a closed mesh, negative where its triangles look inwards.
+    pub fn volume(&self) -> f64 {
+        let origin = self.points.first().copied().unwrap_or_default();
+        let tetrahedron = |t: usize| {
+            let [a, b, c] = self.corners(t).map(|p| p - origin);
+            a.dot(b.cross(c))
+        };
+        (0..self.triangles.len()).map(tetrahedron).sum::<f64>() / 6.0
+    }
+
+    /// Turns every triangle over.
+    pub fn reverse(&mut self) {
+        self.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    }
+
     /// All uses of edges by triangles, sorted by edge.
     fn edge_uses(&self) -> Vec<([u32; 2], u32)> {
         let mut uses: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * self.triangles.len());

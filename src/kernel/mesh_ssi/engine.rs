@@ -22,12 +22,12 @@ use super::topology::{Mesh, Point};
 use super::trace::Chain;
 use super::triple;
 use super::{MeshIntersection, intersect};
-use crate::kernel::geom::Aabb;
 use crate::kernel::geom::closest::{closed_directions, line_from};
+use crate::kernel::geom::{Aabb, Surface};
 use crate::kernel::job::Job;
 use crate::kernel::mesh::body::Body;
 use crate::kernel::ssi::result::{
-    Counts, CurveEnd, CurveKind, CurvePoint, Intersection, IntersectionCurve, Times, Unresolved,
+    CurveEnd, CurveKind, CurvePoint, Intersection, IntersectionCurve, Junction, JunctionKind, Unresolved,
 };
 use crate::kernel::ssi::{self, SsiOptions};
 
@@ -74,7 +74,14 @@ pub enum MeshSsiError {
 struct Pair<'s> {
     sheets: [&'s Sheet; 2],
     numbers: [usize; 2],
+    common: Common,
+}
+
+/// What all pairs have in common.
+#[derive(Clone, Copy)]
+struct Common {
     tol: f64,
+    chord_tol: f64,
     /// The distance of the two surface points that counts as none.
     floor: f64,
     max_inserted: usize,
@@ -92,7 +99,31 @@ pub fn intersect_bodies(
             return Err(MeshSsiError::Empty { side });
         }
     }
-    let bounds = a.iter().chain(b).fold(Aabb::EMPTY, |all, (_, body)| all.union(&body.bounds()));
+    let pairs = (0..a.len()).flat_map(|i| (0..b.len()).map(move |j| [i, a.len() + j])).collect();
+    run(&[a, b].concat(), pairs, options, job)
+}
+
+/// Intersects every two of some bodies, the one that comes first as `a`.
+pub fn intersect_all(
+    bodies: &[(usize, Body)],
+    options: &MeshSsiOptions,
+    job: &Job,
+) -> Result<Intersection, MeshSsiError> {
+    if bodies.len() < 2 {
+        return Err(MeshSsiError::Empty { side: if bodies.is_empty() { 'a' } else { 'b' } });
+    }
+    let pairs = (0..bodies.len()).flat_map(|i| (i + 1..bodies.len()).map(move |j| [i, j])).collect();
+    run(bodies, pairs, options, job)
+}
+
+/// Intersects pairs of bodies, in parallel and with the result in the order of the pairs.
+fn run(
+    bodies: &[(usize, Body)],
+    mut pairs: Vec<[usize; 2]>,
+    options: &MeshSsiOptions,
+    job: &Job,
+) -> Result<Intersection, MeshSsiError> {
+    let bounds = bodies.iter().fold(Aabb::EMPTY, |all, (_, body)| all.union(&body.bounds()));
     let diagonal = bounds.diagonal();
     let (tol, chord_tol) = (options.tol.unwrap_or(1e-6 * diagonal), options.chord_tol.unwrap_or(1e-4 * diagonal));
     for (what, value) in [("tolerance", tol), ("chord tolerance", chord_tol)] {
@@ -102,85 +133,93 @@ pub fn intersect_bodies(
     }
     let start = Instant::now();
     job.phase("Triangulating");
-    let sheets = |bodies: &[(usize, Body)]| -> Vec<(usize, Sheet)> {
-        bodies.par_iter().map(|(number, body)| (*number, Sheet::new(body, chord_tol))).collect()
-    };
-    let (left, right) = (sheets(a), sheets(b));
+    let sheets: Vec<Sheet> = bodies.par_iter().map(|(_, body)| Sheet::new(body, chord_tol)).collect();
     let mut out = Intersection { tol, complete: true, ..Intersection::default() };
-    for (number, sheet) in left.iter().chain(&right) {
+    for ((number, _), sheet) in bodies.iter().zip(&sheets) {
         if sheet.capped {
             job.warn(format!("surface {number}: the triangulation is coarser than the chord tolerance asks for"));
             out.complete = false;
         }
     }
-    let mut times = Times { build: start.elapsed().as_secs_f64() * 1e3, ..Times::default() };
-    for (done, ((na, sa), (nb, sb))) in left.iter().flat_map(|l| right.iter().map(move |r| (l, r))).enumerate() {
-        job.progress(done as f64 / (left.len() * right.len()) as f64);
-        if job.is_cancelled() {
-            out.complete = false;
-            break;
-        }
-        let start = Instant::now();
-        if let Some([ta, _]) = near_agreement(sa, sb, 2.0 * chord_tol, job) {
-            let at = sa.plane(ta).0;
-            hand_over([(*na, sa), (*nb, sb)], tol, &format!("come near with agreeing normals at {at}"), &mut out, job);
-            times.curves += start.elapsed().as_secs_f64() * 1e3;
-            continue;
-        }
-        let found = intersect(sa.triangles(), sa.tree(), sb.triangles(), sb.tree(), job);
-        times.traverse += start.elapsed().as_secs_f64() * 1e3;
-        out.complete &= found.complete;
-        out.counts.leaf_pairs += found.topology.segments.len();
-        let start = Instant::now();
-        let pair = Pair {
-            sheets: [sa, sb],
-            numbers: [*na, *nb],
-            tol,
-            floor: 1e-14 * (diagonal + bounds.max_abs()),
-            max_inserted: options.max_inserted,
-        };
-        let before = (out.curves.len(), out.unresolved.len());
-        for chain in &found.chains {
-            pair.finish(&found, chain, &mut out);
-        }
-        if let Some(place) = out.unresolved.get(before.1).filter(|_| sa.surface().is_some() && sb.surface().is_some()) {
-            let why = format!("have a point that cannot be refined ({})", place.reason);
-            out.curves.truncate(before.0);
-            out.unresolved.truncate(before.1);
-            hand_over([(*na, sa), (*nb, sb)], tol, &why, &mut out, job);
-        }
-        times.curves += start.elapsed().as_secs_f64() * 1e3;
+    out.time_ms.build = start.elapsed().as_secs_f64() * 1e3;
+    out.counts.nodes_built = sheets.iter().map(|s| s.tree().len()).sum();
+    let near = |&[i, j]: &[usize; 2]| bodies[i].1.bounds().grown(2.0 * chord_tol).overlaps(&bodies[j].1.bounds());
+    pairs.retain(near);
+    let common =
+        Common { tol, chord_tol, floor: 1e-14 * (diagonal + bounds.max_abs()), max_inserted: options.max_inserted };
+    job.phase("Intersecting triangles");
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    let found: Vec<(Intersection, Option<String>)> = pairs
+        .par_iter()
+        .map(|&[i, j]| {
+            let pair = Pair { sheets: [&sheets[i], &sheets[j]], numbers: [bodies[i].0, bodies[j].0], common };
+            let found = pair.intersect(job);
+            let done = 1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+            job.progress(done as f64 / pairs.len() as f64);
+            found
+        })
+        .collect();
+    for (part, note) in found {
+        note.into_iter().for_each(|note| job.warn(note));
+        out.append(part);
     }
     out.curves = join(std::mem::take(&mut out.curves), JOINING * diagonal);
-    let all: Vec<(usize, &Sheet)> = left.iter().chain(&right).map(|(n, s)| (*n, s)).collect();
+    let all: Vec<(usize, &Sheet)> = bodies.iter().zip(&sheets).map(|((n, _), s)| (*n, s)).collect();
     out.junctions.extend(triple::points(&out.curves, &all, JOINING * diagonal, job));
-    out.complete &= out.unresolved.is_empty();
-    out.counts = Counts { nodes_built: left.iter().chain(&right).map(|(_, s)| s.tree().len()).sum(), ..out.counts };
-    out.time_ms = times;
+    out.complete &= out.unresolved.is_empty() && !job.is_cancelled();
     Ok(out)
 }
 
-/// Lets the hybrid engine intersect a pair of surfaces, and adds what it finds.
-fn hand_over(pair: [(usize, &Sheet); 2], tol: f64, why: &str, out: &mut Intersection, job: &Job) {
-    let [(na, sa), (nb, sb)] = pair;
-    let (Some(a), Some(b)) = (sa.surface(), sb.surface()) else { return };
-    job.warn(format!("surfaces {na} and {nb} {why}: handed over to the hybrid engine"));
+/// Lets the hybrid engine intersect a pair of surfaces.
+fn handed_over(numbers: [usize; 2], a: &Surface, b: &Surface, tol: f64, job: &Job) -> Intersection {
     let options = SsiOptions { tol: Some(tol), ..SsiOptions::default() };
-    match ssi::intersect(&[(na, a.as_ref())], &[(nb, b.as_ref())], &options, job) {
-        Ok(found) => out.append(found),
-        Err(error) => {
-            out.unresolved.push(Unresolved {
-                a: na,
+    match ssi::intersect(&[(numbers[0], a)], &[(numbers[1], b)], &options, job) {
+        Ok(found) => found,
+        Err(error) => Intersection {
+            unresolved: vec![Unresolved {
+                a: numbers[0],
                 uv_box: a.domain(),
-                b: nb,
+                b: numbers[1],
                 st_box: b.domain(),
                 reason: format!("the hybrid engine says: {error}"),
-            });
-        }
+            }],
+            ..Intersection::default()
+        },
     }
 }
 
 impl Pair<'_> {
+    /// All of one pair, and a note where the hybrid engine did it.
+    fn intersect(&self, job: &Job) -> (Intersection, Option<String>) {
+        let mut out = Intersection { complete: true, ..Intersection::default() };
+        let [sa, sb] = self.sheets;
+        let [na, nb] = self.numbers;
+        if job.is_cancelled() {
+            return (Intersection::default(), None);
+        }
+        let start = Instant::now();
+        let why = match near_agreement(sa, sb, 2.0 * self.common.chord_tol, job) {
+            Some([t, _]) => Some(format!("come near with agreeing normals at {}", sa.plane(t).0)),
+            None => {
+                let found = intersect(sa.triangles(), sa.tree(), sb.triangles(), sb.tree(), job);
+                out.time_ms.traverse = start.elapsed().as_secs_f64() * 1e3;
+                out.complete = found.complete;
+                out.counts.leaf_pairs = found.topology.segments.len();
+                for chain in &found.chains {
+                    self.finish(&found, chain, &mut out);
+                }
+                out.unresolved.first().map(|u| format!("have a point that cannot be refined ({})", u.reason))
+            }
+        };
+        let mut note = None;
+        if let (Some(why), Some(a), Some(b)) = (why, sa.surface(), sb.surface()) {
+            note = Some(format!("surfaces {na} and {nb} {why}: handed over to the hybrid engine"));
+            out = handed_over([na, nb], a, b, self.common.tol, job);
+        }
+        out.time_ms.curves = start.elapsed().as_secs_f64() * 1e3 - out.time_ms.traverse;
+        (out, note)
+    }
+
     /// A chain as a curve of the answer: refined, and as dense as the tolerance asks for.
     fn finish(&self, found: &MeshIntersection, chain: &Chain, out: &mut Intersection) {
         let mut points: Vec<CurvePoint> = Vec::with_capacity(chain.points.len());
@@ -214,9 +253,14 @@ impl Pair<'_> {
         } else {
             [end(chain.points[0]), end(chain.points[chain.points.len() - 1])]
         };
-        if failed.is_none() && error_bound > self.tol {
-            let reason = format!("{} points were inserted and {error_bound:.3e} is left", self.max_inserted);
+        if failed.is_none() && error_bound > self.common.tol {
+            let reason = format!("{} points were inserted and {error_bound:.3e} is left", self.common.max_inserted);
             failed = points.first().map(|p| (*p, reason));
+        }
+        let mut end_ids = [None; 2];
+        for (k, id) in end_ids.iter_mut().enumerate().filter(|(k, _)| ends[*k] == CurveEnd::Junction) {
+            let at = if k == 0 { points[0] } else { points[points.len() - 1] };
+            *id = Some(bifurcation(&at, 1e3 * self.common.floor, &mut out.junctions));
         }
         if let Some((at, reason)) = failed {
             out.unresolved.push(Unresolved {
@@ -231,7 +275,7 @@ impl Pair<'_> {
             kind: CurveKind::Transversal,
             closed: chain.closed,
             ends,
-            end_ids: [None, None],
+            end_ids,
             error_bound,
             region: None,
             points,
@@ -275,7 +319,8 @@ impl Pair<'_> {
             let uv = if side == 0 { start.st } else { start.uv };
             let foot = line_from(surface, closed_directions(surface), p, q - p, uv);
             // An edge that only the triangles meet is left to the planes.
-            if foot.residual <= self.floor.max(1e-3 * self.tol) && (-1e-9..=1.0 + 1e-9).contains(&foot.t) {
+            if foot.residual <= self.common.floor.max(1e-3 * self.common.tol) && (-1e-9..=1.0 + 1e-9).contains(&foot.t)
+            {
                 let mut at = CurvePoint { xyz: foot.point, ..start };
                 *(if side == 0 { &mut at.st } else { &mut at.uv }) = foot.uv;
                 return Ok(at);
@@ -309,7 +354,7 @@ impl Pair<'_> {
                 let uv = [start.uv, start.st];
                 let other = touch(1 - side, uv[1 - side]);
                 let (own, other) =
-                    super::border::meet(self.sheets[side].surface(), uv[side], direction, other, self.floor)
+                    super::border::meet(self.sheets[side].surface(), uv[side], direction, other, self.common.floor)
                         .ok_or_else(|| {
                             "the end of a curve on a border was not reached from the triangles".to_owned()
                         })?;
@@ -319,8 +364,8 @@ impl Pair<'_> {
                 point.xyz = own.1;
                 Ok(point)
             }
-            None => refine(touch(0, start.uv), touch(1, start.st), self.floor)
-                .or_else(|_| refine(touch(0, start.uv), touch(1, start.st), 1e-3 * self.tol))
+            None => refine(touch(0, start.uv), touch(1, start.st), self.common.floor)
+                .or_else(|_| refine(touch(0, start.uv), touch(1, start.st), 1e-3 * self.common.tol))
                 .map(with)
                 .map_err(|e| format!("{e} (normals within {TANGENTIAL} rad are for the hybrid engine)")),
         }
@@ -332,7 +377,7 @@ impl Pair<'_> {
     fn adapted(&self, points: Vec<CurvePoint>, triangles: &[[u32; 2]], closed: bool) -> (Vec<CurvePoint>, f64) {
         if self.sheets.iter().all(|s| s.surface().is_none()) {
             // The segments of two meshes are the truth.
-            return (points, self.floor);
+            return (points, self.common.floor);
         }
         let middle = |p: &CurvePoint, q: &CurvePoint, triangles: [u32; 2]| {
             let start =
@@ -346,7 +391,7 @@ impl Pair<'_> {
             let mut inserted = 0;
             while let (Some(&from), Some(&to)) = (dense.last(), stack.last()) {
                 match middle(&from, &to, triangles) {
-                    Some((m, off)) if off > 0.25 * self.tol && inserted < self.max_inserted => {
+                    Some((m, off)) if off > 0.25 * self.common.tol && inserted < self.common.max_inserted => {
                         inserted += 1;
                         stack.push(m);
                     }
@@ -369,7 +414,7 @@ impl Pair<'_> {
                 let off = (at + 1..=next)
                     .map(|k| distance_to_chord(dense[k].xyz, dense[at].xyz, dense[next + 1].xyz))
                     .fold(0.0, f64::max);
-                if off > 0.25 * self.tol {
+                if off > 0.25 * self.common.tol {
                     break;
                 }
                 dropped = dropped.max(off);
@@ -378,8 +423,17 @@ impl Pair<'_> {
             kept.push(dense[next]);
             at = next;
         }
-        (kept, 1.5 * worst + dropped + self.floor)
+        (kept, 1.5 * worst + dropped + self.common.floor)
     }
+}
+
+/// The number of the junction at a point in which more than two segments meet, made when it is new.
+fn bifurcation(at: &CurvePoint, same: f64, junctions: &mut Vec<Junction>) -> usize {
+    junctions.iter().position(|j| j.xyz.distance(at.xyz) <= same).unwrap_or_else(|| {
+        let kind = JunctionKind::HigherOrder;
+        junctions.push(Junction { xyz: at.xyz, a: at.a, uv: at.uv, b: at.b, st: at.st, gap: 0.0, kind });
+        junctions.len() - 1
+    })
 }
 
 fn distance_to_chord(p: DVec3, a: DVec3, b: DVec3) -> f64 {

@@ -17,8 +17,6 @@ pub struct Sheet {
     points: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
     uv: Vec<DVec2>,
-    /// Of a surface: its unit normals at the vertices.
-    normals: Vec<DVec3>,
     tree: TriTree,
     surface: Option<Arc<Surface>>,
     /// Whether the tessellation's cap made it coarser than asked for.
@@ -28,18 +26,18 @@ pub struct Sheet {
 impl Sheet {
     /// Triangulates a surface to a chord tolerance, or takes a mesh as it is.
     pub fn new(body: &Body, chord_tol: f64) -> Self {
-        let (points, triangles, uv, normals, surface, capped) = match body {
+        let (points, triangles, uv, surface, capped) = match body {
             Body::Surface(surface) => {
                 let mesh = tessellate(surface, &TessellateOptions::new(chord_tol));
-                (mesh.points, mesh.triangles, mesh.uv, mesh.normals, Some(Arc::clone(surface)), mesh.capped)
+                (mesh.points, mesh.triangles, mesh.uv, Some(Arc::clone(surface)), mesh.capped)
             }
             Body::Facets(facets) => {
                 let mesh = facets.mesh();
-                (mesh.points().to_vec(), mesh.triangles().to_vec(), Vec::new(), Vec::new(), None, false)
+                (mesh.points().to_vec(), mesh.triangles().to_vec(), Vec::new(), None, false)
             }
         };
         let tree = TriTree::new(points.clone(), &triangles);
-        Self { points, triangles, uv, normals, tree, surface, capped }
+        Self { points, triangles, uv, tree, surface, capped }
     }
 
     /// The surface behind the triangles.
@@ -63,16 +61,9 @@ impl Sheet {
         (a, (b - a).cross(c - a).normalize_or_zero())
     }
 
-    /// The unit normal of a triangle of a surface, and the angle up to which the surface's normal differs from it,
-    /// twice that at the vertices to be on the safe side. A triangle without area allows every normal.
-    pub fn cone(&self, triangle: u32) -> (DVec3, f64) {
-        let (_, normal) = self.plane(triangle);
-        if normal == DVec3::ZERO {
-            return (normal, std::f64::consts::PI);
-        }
-        let corners = self.triangles[triangle as usize];
-        let angle = |k: u32| self.normals.get(k as usize).map_or(0.0, |n| n.dot(normal).abs().min(1.0).acos());
-        (normal, 2.0 * corners.map(angle).into_iter().fold(0.0, f64::max))
+    /// The parameters of the corners of a triangle of a surface.
+    pub fn corner_uv(&self, triangle: u32) -> [DVec2; 3] {
+        self.triangles[triangle as usize].map(|k| self.uv_of(k))
     }
 
     /// The end points of an edge.
