@@ -1,9 +1,10 @@
 //! Meshes and structured blocks through the whole program: opened, healed, intersected and exported.
 
-#![allow(clippy::unwrap_used, reason = "a test helper may stop the test")]
+#![allow(clippy::panic, clippy::unwrap_used, reason = "a test helper may stop the test")]
 
 use std::path::Path;
 use std::process::{Command, Output};
+use std::slice::from_ref;
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
@@ -163,7 +164,7 @@ fn plane(z: f64) -> TriMesh {
 fn a_surface_meets_a_mesh_in_the_exact_curve_of_its_triangles() {
     let bodies = [(3, Body::from(bowl())), (7, Body::from(Arc::new(Facets::of_mesh(plane(0.4)))))];
     let [a, b] = bodies;
-    let found = intersect_with(Engine::Mesh, &[a.clone()], &[b.clone()], Some(1e-6), &Job::new()).unwrap();
+    let found = intersect_with(Engine::Mesh, from_ref(&a), from_ref(&b), Some(1e-6), &Job::new()).unwrap();
     assert!(found.complete);
     let [curve] = &found.curves[..] else { panic!("{} curves", found.curves.len()) };
     assert!(curve.closed && curve.error_bound <= 1e-6);
@@ -207,8 +208,7 @@ fn near_tangency_is_handed_to_the_hybrid_engine_and_both_engines_agree() {
 #[test]
 fn three_bodies_meet_in_points() {
     let wall = |direction: DVec3| {
-        let c = [(-2.0, -1.0), (2.0, -1.0), (-2.0, 2.0), (2.0, 2.0)].map(|(s, z)| direction * s + DVec3::Z * z);
-        c
+        [(-2.0, -1.0), (2.0, -1.0), (-2.0, 2.0), (2.0, 2.0)].map(|(s, z)| direction * s + DVec3::Z * z)
     };
     let spline = Body::from(Arc::new(Surface::bilinear(wall(DVec3::new(1.0, 1.0, 0.0))).unwrap()));
     let [p, q, r, s] = wall(DVec3::new(1.0, -0.5, 0.0));
