@@ -491,6 +491,29 @@ fn tube_sheet(report: &mut Report, seed: u64, tilt: f64) {
     );
 }
 
+#[test]
+fn a_loop_shallower_than_the_error_of_the_fitted_gap_is_found() {
+    let mut report = Report::default();
+    loop_and_branch(&mut report, 1, 1e-4);
+    report.done();
+}
+
+#[test]
+fn a_gap_that_drowns_in_the_error_of_its_fit_is_no_contact() {
+    let mut report = Report::default();
+    almost_overlap(&mut report, 0, 1e-6);
+    almost_overlap(&mut report, 1, 1e-7);
+    report.done();
+}
+
+#[test]
+fn a_rational_node_smaller_than_its_padding_is_fitted_anew() {
+    // Once without end: the pole of one sphere near the other one.
+    let mut report = Report::default();
+    spheres(&mut report, 6, [0.3, 1.0], 1e-2);
+    report.done();
+}
+
 /// How many of each family: `scale` 1 in the quick run.
 fn all(scale: u64) -> Report {
     let mut report = Report::default();

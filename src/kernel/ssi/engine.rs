@@ -6,6 +6,10 @@
 //!    every seed that lies on no curve yet ([`super::trace`]).
 //! 3. What was neither proved empty nor traced is listed as unresolved. That list is the certificate: when it is
 //!    empty, every surviving pair of nodes was visited by a curve or belongs to a junction or a coincident region.
+//!
+//! Thesis 5.3 finds contacts by the binormals of osculating tori. Here the fitted gap finds and excludes them, because
+//! a torus agrees to second order only and can exclude nothing; the tori ([`super::tangency`]) give further starting
+//! points where Newton's method does not settle from the gap's own critical point.
 
 use std::collections::HashMap;
 use std::time::Instant;

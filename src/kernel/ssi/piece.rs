@@ -141,6 +141,11 @@ impl Piece {
     }
 
     fn sums_any<const D: usize>(&self, uv: DVec2) -> [[DVec4; D]; D] {
+        if self.degree == [3, 3]
+            && let Ok(net) = <&[DVec4; 16]>::try_from(self.points.as_slice())
+        {
+            return bicubic(net, cubic::<D>(uv.x), cubic::<D>(uv.y));
+        }
         match self.degree[0].max(self.degree[1]) {
             0..=3 => self.sums::<4, D>(uv),
             4..=7 => self.sums::<8, D>(uv),
@@ -175,6 +180,34 @@ impl Patch for Piece {
         let vv = (t(0, 2) - v * (2.0 * s[0][1].w) - p * s[0][2].w) * w;
         Jet2 { p, u, v, second: [uu, uv, vv] }
     }
+}
+
+/// The sums of a bicubic net, with lengths that the compiler knows: most patches are bicubic.
+fn bicubic<const D: usize>(net: &[DVec4; 16], bu: [[f64; 4]; D], bv: [[f64; 4]; D]) -> [[DVec4; D]; D] {
+    let mut out = [[DVec4::ZERO; D]; D];
+    for j in 0..4 {
+        let row = [net[4 * j], net[4 * j + 1], net[4 * j + 2], net[4 * j + 3]];
+        for k in 0..D {
+            let b = &bu[k];
+            let along = row[0] * b[0] + row[1] * b[1] + row[2] * b[2] + row[3] * b[3];
+            for l in 0..D - k {
+                out[k][l] += along * bv[l][j];
+            }
+        }
+    }
+    out
+}
+
+/// Values and up to two derivatives of the cubic Bernstein polynomials.
+fn cubic<const D: usize>(t: f64) -> [[f64; 4]; D] {
+    let s = 1.0 - t;
+    let (ss, st, tt) = (s * s, s * t, t * t);
+    let all = [
+        [s * ss, 3.0 * ss * t, 3.0 * s * tt, t * tt],
+        [-3.0 * ss, 3.0 * (ss - 2.0 * st), 3.0 * (2.0 * st - tt), 3.0 * tt],
+        [6.0 * s, 6.0 * (t - 2.0 * s), 6.0 * (s - 2.0 * t), 6.0 * t],
+    ];
+    std::array::from_fn(|k| all[k.min(2)])
 }
 
 /// Values and derivatives of the Bernstein polynomials of degree `n < K`, by the triangular recurrence: stable on

@@ -48,6 +48,9 @@ const SMALLEST: f64 = 1e-9;
 /// More pairs than this and the rest is unresolved.
 const MOST_PAIRS: usize = 20_000_000;
 
+/// More nodes than this (about a gigabyte) and the rest is unresolved.
+const MOST_NODES: usize = 1_000_000;
+
 /// Descends through all pairs of pieces whose boxes meet.
 pub fn traverse(sides: [&Side; 2], trees: &mut [Tree; 2], gap: f64, job: &Job) -> Traversal {
     let mut out = Traversal::default();
@@ -109,13 +112,17 @@ pub fn traverse(sides: [&Side; 2], trees: &mut [Tree; 2], gap: f64, job: &Job) -
                     }
                 }
             }
-            let halves = |tree: &mut Tree, index: usize| tree.children(index);
+            if trees.iter().map(|t| t.nodes.len()).sum::<usize>() > MOST_NODES {
+                out.unresolved.push((ia, ib, "too many nodes were built"));
+                break;
+            }
+            let mut halves = |side: usize, index: usize| trees[side].children(index, &sides[side].pieces);
             if size_a > 1.5 * size_b {
-                stack.extend(halves(&mut trees[0], ia).map(|c| (c, ib)));
+                stack.extend(halves(0, ia).map(|c| (c, ib)));
             } else if size_b > 1.5 * size_a {
-                stack.extend(halves(&mut trees[1], ib).map(|c| (ia, c)));
+                stack.extend(halves(1, ib).map(|c| (ia, c)));
             } else {
-                let (ca, cb) = (halves(&mut trees[0], ia), halves(&mut trees[1], ib));
+                let (ca, cb) = (halves(0, ia), halves(1, ib));
                 stack.extend(ca.iter().flat_map(|&x| cb.iter().map(move |&y| (x, y))));
             }
         }

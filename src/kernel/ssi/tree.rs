@@ -12,12 +12,21 @@
 //! solution is unique for its w: one arc, no loop, no singular point (an interval Newton argument, which replaces
 //! the thesis's "Gauss maps disjoint, so at most one branch"; that is false). Rational pieces are bounded by
 //! interpolating polynomials whose measured error, with a safety factor, pads all bounds.
+//!
+//! Why not the nodes of [`crate::kernel::bvh`]: those are for display, distance and repeated queries. They round a
+//! rectangle and a cone of normals outwards to `f32`, which costs 80 bytes and proves emptiness, but the arc test needs
+//! the affine part and bounds of the remainder's derivatives in `f64`, or near tangency (angles of 1e-7) no pair is
+//! ever decided. A query here builds a hundredth of the nodes of a full hierarchy and keeps none.
+//! Where a rational node becomes as small as the error of its interpolant, the piece is interpolated anew.
 
 use glam::{DVec2, DVec3};
 
 use super::piece::Piece;
 use super::side::Side;
 use crate::kernel::geom::Aabb;
+
+/// The share of a rational node's size from which on the error of its interpolant is made smaller.
+const REFIT: f64 = 1e-4;
 
 /// A node over a rectangle of a piece's local domain.
 #[derive(Clone, Debug)]
@@ -195,16 +204,18 @@ impl Tree {
         self.nodes.push(node);
     }
 
-    /// The two halves of a node, built on first use.
-    pub fn children(&mut self, index: usize) -> [usize; 2] {
+    /// The two halves of a node of these pieces, built on first use.
+    pub fn children(&mut self, index: usize, pieces: &[Piece]) -> [usize; 2] {
         if let Some(children) = self.nodes[index].children {
             return children;
         }
         let node = &self.nodes[index];
         let [p, q] = node.degree;
         // Along the direction in which it is longer or bends more.
-        let score = |a: DVec3, d: [f64; 2]| a.length() + 4.0 * (d[0] + d[1]);
-        let along = if score(node.au, node.dx) >= score(node.av, node.dy) { 0 } else { 1 };
+        let score = |a: DVec3, d: [f64; 2], n: usize| {
+            a.length() + 4.0 * (d[0] + d[1] - 2.0 * node.pad * (n * n) as f64).max(0.0)
+        };
+        let along = if score(node.au, node.dx, p) >= score(node.av, node.dy, q) { 0 } else { 1 };
         let (mut first, mut second) = (node.net.clone(), node.net.clone());
         let width = p + 1;
         let (count, length, stride, step) =
@@ -223,8 +234,16 @@ impl Tree {
         end[along] = middle[along];
         start[along] = middle[along];
         let (piece, degree, pad, low, high) = (node.piece, node.degree, node.pad, node.low, node.high);
-        let a = Node::new(piece, [low, end], Some(index), degree, first, pad);
-        let b = Node::new(piece, [start, high], Some(index), degree, second, pad);
+        // Below some size the error of the interpolant is all that is left of a rational node: fit it anew.
+        let refit = pad > REFIT * node.size();
+        let make = |rect: [DVec2; 2], net: Vec<DVec3>| {
+            if refit {
+                let (degree, net, error) = interpolated(&pieces[piece], rect);
+                return Node::new(piece, rect, Some(index), degree, net, (4.0 * error).min(pad));
+            }
+            Node::new(piece, rect, Some(index), degree, net, pad)
+        };
+        let (a, b) = (make([low, end], first), make([start, high], second));
         let children = [self.nodes.len(), self.nodes.len() + 1];
         self.nodes.push(a);
         self.nodes.push(b);
