@@ -3,12 +3,16 @@
 //!
 //! `cargo bench --bench bvh`; with the argument `build`, `lazy` or `traverse` it runs only that, once, for a profiler.
 
+#[path = "../support/clock.rs"]
+mod clock;
+
 use std::error::Error;
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
+use clock::{on_one_thread, together};
 use glam::DVec3;
 use patchwright::kernel::bvh::{
     BvhOptions, Instructions, Overlap, SurfaceTree, TraverseOptions, Verdict, VolumeKind, VolumeTree, early_exit,
@@ -37,13 +41,6 @@ fn graphs() -> Result<Option<[Arc<Surface>; 2]>, Box<dyn Error>> {
     Ok(<[_; 2]>::try_from(surfaces).ok())
 }
 
-/// Time that this thread spent on a processor, where the system tells: a busy machine disturbs it less than the
-/// clock. It comes in steps of some milliseconds, so short runs are repeated.
-fn cpu_seconds() -> Option<f64> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    Some(text.split(' ').next()?.parse::<u64>().ok()? as f64 * 1e-9)
-}
-
 /// Seconds of one run, after a preparation that is not counted.
 fn seconds<T>(mut prepare: impl FnMut() -> T, mut run: impl FnMut(&T)) -> f64 {
     let prepared = prepare();
@@ -52,13 +49,8 @@ fn seconds<T>(mut prepare: impl FnMut() -> T, mut run: impl FnMut(&T)) -> f64 {
     let repeat = (0.08 / start.elapsed().as_secs_f64()).clamp(1.0, 64.0) as usize;
     drop(prepared);
     let prepared: Vec<T> = (0..repeat).map(|_| prepare()).collect();
-    let (clock, cpu) = (Instant::now(), cpu_seconds());
-    prepared.iter().for_each(run);
-    let total = match (cpu, cpu_seconds()) {
-        (Some(start), Some(end)) => end - start,
-        _ => clock.elapsed().as_secs_f64(),
-    };
-    total / repeat as f64
+    let mut left = prepared.iter();
+    together(repeat, || left.by_ref().take(1).for_each(&mut run)).as_secs_f64() / repeat as f64
 }
 
 fn median(mut times: Vec<f64>) -> f64 {
@@ -242,20 +234,20 @@ fn counted(pairs: &[[Arc<Surface>; 2]], kind: VolumeKind, height: u32) -> Result
     let (mut count, mut time) = (0, 0.0);
     for [a, b] in pairs {
         let options = options(height, Instructions::Best);
-        let start;
+        let mut overlap = Overlap::default();
+        let spent;
         if kind == VolumeKind::Rss {
             let built = trees(&[a, b], &options);
             build(&built, false);
             let [ta, tb] = &built[..] else { continue };
-            start = Instant::now();
-            count += walk(ta, tb, None, false).pairs.len();
+            spent = together(1, || overlap = walk(ta, tb, None, false));
         } else {
             let tree = |s| VolumeTree::build(s, &options, kind, &Job::new());
             let (ta, tb) = (tree(a)?, tree(b)?);
-            start = Instant::now();
-            count += ta.overlap(&tb, None, 0.0, &Job::new()).pairs.len();
+            spent = together(1, || overlap = ta.overlap(&tb, None, 0.0, &Job::new()));
         }
-        time += start.elapsed().as_secs_f64();
+        count += overlap.pairs.len();
+        time += spent.as_secs_f64();
     }
     Ok((count, time))
 }
@@ -326,8 +318,6 @@ fn measure(only: Option<&str>) -> Result<(), Box<dyn Error>> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let only = std::env::args().nth(1).filter(|a| !a.starts_with('-'));
-    // Everything on one thread, which is then the one whose time is taken.
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    pool.install(|| measure(only.as_deref()).map_err(|error| error.to_string()))?;
+    on_one_thread(|| measure(only.as_deref()).map_err(|error| error.to_string()))??;
     Ok(())
 }

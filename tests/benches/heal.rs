@@ -4,11 +4,14 @@
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a benchmark may stop at a broken file")]
 
-use std::hint::black_box;
+#[path = "../support/clock.rs"]
+mod clock;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use clock::{median, on_one_thread, together};
 use glam::{DVec2, DVec3};
 use patchwright::io;
 use patchwright::kernel::geom::{Knots, Surface};
@@ -19,18 +22,6 @@ use patchwright::model::document::{Document, Shape, Unit};
 use patchwright::model::healing::{self, Healing};
 use patchwright::model::resolve::resolve;
 use patchwright::model::spec::{HealSpec, IsoAt, PatchSpec, Piece};
-
-fn median<T>(runs: usize, mut f: impl FnMut() -> T) -> Duration {
-    let mut times: Vec<Duration> = (0..runs)
-        .map(|_| {
-            let start = Instant::now();
-            black_box(f());
-            start.elapsed()
-        })
-        .collect();
-    times.sort();
-    times[runs / 2]
-}
 
 /// The pieces of the first four surfaces that an iso-line of the parent runs through.
 fn iso(document: &Document, at: IsoAt, from: f64, to: f64) -> Vec<Piece> {
@@ -87,6 +78,10 @@ fn boundary(healing: &Healing) -> f64 {
     worst
 }
 
+fn milliseconds(time: Duration) -> f64 {
+    1e3 * time.as_secs_f64()
+}
+
 fn row(name: &str, ours: String, reference: &str) {
     println!("{name:46} {ours:>24}   {reference}");
 }
@@ -100,7 +95,7 @@ fn wavy(document: &Document) {
         let time = median(5, || healing::run(document, &spec, &Job::new()).unwrap());
         let size = format!("{}x{}", r.resolution[0], r.resolution[1]);
         row(&format!("heal_wavy {name}: error, {size}"), format!("{:.2e}", r.max_error), "4e-3 (other), 4e-4 (target)");
-        row("  time", format!("{:.1} ms", time.as_secs_f64() * 1e3), "200 ms (other), 100 ms (target)");
+        row("  time", format!("{:.1} ms", milliseconds(time)), "200 ms (other), 100 ms (target)");
         row("  samples on / artificial", format!("{} / {}", r.projected, r.artificial), "448 points (other)");
         row(
             "  boundary / diagonal",
@@ -124,9 +119,9 @@ fn wavy(document: &Document) {
     let set = SurfaceSet::new(resolved.surfaces.clone(), resolved.options.chord_tol, &Job::new());
     let sides = resolved.patches[0].sides.to_vec();
     let time = median(9, || preview(&sides, Some(&set), &PreviewOptions::default(), &Job::new()).unwrap());
-    row("preview, 12 x 12 projected", format!("{:.2} ms", time.as_secs_f64() * 1e3), "50 ms (target)");
+    row("preview, 12 x 12 projected", format!("{:.2} ms", milliseconds(time)), "50 ms (target)");
     let time = median(3, || SurfaceSet::new(resolved.surfaces.clone(), resolved.options.chord_tol, &Job::new()));
-    row("  tessellation and tree for it (once)", format!("{:.1} ms", time.as_secs_f64() * 1e3), "");
+    row("  tessellation and tree for it (once)", format!("{:.1} ms", milliseconds(time)), "");
 }
 
 /// The same task on a smooth shape: a gentle graph over [0, 8]^2 cut into four around a hole.
@@ -148,7 +143,11 @@ fn smooth() -> Document {
 }
 
 fn main() {
-    row("", "ours".into(), "reference");
+    on_one_thread(measure).unwrap();
+}
+
+fn measure() {
+    row("CPU time of one thread, medians", "ours".into(), "reference");
     let data = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data"));
     let case = data.join("cases/heal_wavy.igs");
     if case.exists() {
@@ -163,7 +162,7 @@ fn main() {
     let r = &healing.patches[0].1.report;
     let size = format!("{}x{}", r.resolution[0], r.resolution[1]);
     row(&format!("smooth region: error, {size}"), format!("{:.2e}", r.max_error), "6e-5 (other)");
-    row("  time", format!("{:.1} ms", time.as_secs_f64() * 1e3), "");
+    row("  time", format!("{:.1} ms", milliseconds(time)), "");
     let model = data.join("models/pocc_surf114.igs");
     if model.exists() {
         let document = io::open(&model).unwrap().document;
@@ -175,7 +174,7 @@ fn main() {
             let ours = format!("{:.2e} on {}", r.max_error, r.projected);
             row(&format!("pocc_surf114 {name}: error, samples"), ours, "4e-4 wanted (inches)");
         }
-        row("  time, all patches", format!("{:.1} ms", time.as_secs_f64() * 1e3), "");
+        row("  time, all patches", format!("{:.1} ms", milliseconds(time)), "");
     }
     rays();
 }
@@ -188,10 +187,11 @@ fn rays() {
     let f = |x: f64, y: f64| DVec3::new(x, y, (1.3 * x).sin() * (1.1 * y).cos());
     let points = g.iter().flat_map(|&y| g.iter().map(move |&x| f(x, y))).collect();
     let surface = Arc::new(Surface::new(knots.clone(), knots, points, None).unwrap());
-    let start = Instant::now();
-    let set = SurfaceSet::new(vec![(0, surface)], 2e-3, &Job::new());
+    let mut made = None;
+    let time = together(1, || made = Some(SurfaceSet::new(vec![(0, Arc::clone(&surface))], 2e-3, &Job::new())));
+    let set = made.unwrap();
     let count = set.tree().len();
-    row(&format!("tree over {count} triangles"), format!("{:.0} ms", start.elapsed().as_secs_f64() * 1e3), "");
+    row(&format!("tree over {count} triangles"), format!("{:.0} ms", milliseconds(time)), "");
     let mut seed = 1_u64;
     let mut next = move || {
         seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
