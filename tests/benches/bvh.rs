@@ -162,17 +162,31 @@ fn two_surfaces(table: &mut Table, [a, b]: [&Surface; 2]) -> Result<(), Box<dyn 
         };
         table.row(&format!("  {name}"), thesis, "", milliseconds(runs(1, || seconds(|| (), build))));
     }
+    // Both from nothing, one beside the other, what was built kept until the time is taken.
     let mut nodes = 0;
-    let first = runs(5, || {
-        let query = |(): &()| {
-            if let [ta, tb] = &trees(&[a, b], &options(6, Instructions::Best))[..] {
+    let from_nothing = |finish: &mut dyn FnMut(&[SurfaceTree])| {
+        let mut kept = Vec::new();
+        seconds(
+            || (),
+            |()| {
+                let trees = trees(&[a, b], &options(6, Instructions::Best));
+                finish(&trees);
+                kept.push(trees);
+            },
+        )
+    };
+    let (mut first, mut whole) = (Vec::new(), Vec::new());
+    for _ in 0..5 {
+        whole.push(from_nothing(&mut |trees| build(trees, true)));
+        first.push(from_nothing(&mut |trees| {
+            if let [ta, tb] = trees {
                 black_box(walk(ta, tb, None, true));
                 nodes = ta.memory().nodes + tb.memory().nodes;
             }
-        };
-        seconds(|| (), query)
-    });
-    let share = format!("{} (1/{:.0}), {nodes} nodes", milliseconds(first), full[2] / first);
+        }));
+    }
+    let (first, whole) = (median(first), median(whole));
+    let share = format!("{} (1/{:.0} of {}), {nodes} nodes", milliseconds(first), whole / first, milliseconds(whole));
     table.row("first query, nothing built, early exit", "", "1/80 of the build", share);
 
     let built = trees(&[a, b], &options(6, Instructions::Best));
