@@ -410,3 +410,55 @@ fn the_continuation_of_a_neighbouring_piece_is_no_coincident_region() {
         assert_eq!((curves(&found).len(), found.result.miters.len()), (2, 2));
     }
 }
+
+#[test]
+fn degenerate_miter_points_are_isolated_or_have_their_branches() {
+    for at in [0.0, 0.13] {
+        // y^2 = -c(x) with a double zero of c: the point alone, or the two lines y = +-(x - at).
+        let isolated = solve("isolated", &interpolate(&square(), &square(), ridge(move |x| (x - at) * (x - at))));
+        assert!(isolated.result.complete && curves(&isolated).is_empty());
+        assert!(isolated.result.miters.len() == 1 && isolated.result.miters[0].isolated);
+        assert!(isolated.result.miters[0].uv.distance(DVec2::new(at, 0.0)) < 1e-9);
+        let double = solve("two branches", &interpolate(&square(), &square(), ridge(move |x| -(x - at) * (x - at))));
+        assert!(double.result.complete && double.result.miters.len() == 1 && !double.result.miters[0].isolated);
+        assert_eq!(curves(&double).len(), 2);
+        for c in curves(&double) {
+            assert_eq!(c.ends, [CurveEnd::Miter, CurveEnd::Boundary]);
+            for p in &c.points {
+                assert!(((p.uv.x - at).abs() - p.uv.y.abs()).abs() < 1e-9 && (p.uv.y + p.st.y).abs() < 1e-9);
+            }
+        }
+    }
+}
+
+#[test]
+fn cusp_edges_and_folds_in_any_direction_are_complete() {
+    let k = |d| Knots::bezier(d, -1.0, 1.0).unwrap();
+    let curved = |u: f64, v: f64| DVec2::new(u - 0.3 * v * v + 0.1, v);
+    let oblique = interpolate(&k(3), &k(3), |u, v| {
+        let p = DVec2::from_angle(0.5).rotate(DVec2::new(u, v));
+        turned(DVec3::new(p.x * p.x, p.x.powi(3), p.y))
+    });
+    let bent = interpolate(&k(6), &k(6), |u, v| {
+        let p = curved(u, v);
+        turned(DVec3::new(p.x * p.x, p.x.powi(3), p.y))
+    });
+    let fold = interpolate(&k(4), &k(4), |u, v| {
+        let p = curved(u, v);
+        turned(DVec3::new(p.x * p.x, p.y, 0.2 * p.x * p.x * p.y))
+    });
+    for (name, surface, regions) in
+        [("oblique cusp", &oblique, 0), ("curved cusp", &bent, 0), ("curved fold", &fold, 1)]
+    {
+        let found = solve(name, surface);
+        assert!(found.result.complete && found.result.miters.is_empty(), "{name}");
+        let cusps: Vec<_> = found.result.curves.iter().filter(|c| c.kind == CurveKind::CuspEdge).collect();
+        assert!(cusps.len() == 1 && cusps[0].ends == [CurveEnd::Boundary; 2], "{name}");
+        assert_eq!(found.result.regions.len(), regions, "{name}");
+        // Points on both sides of the curved fold: (a, v) and (-a, v).
+        for p in found.result.regions.iter().flat_map(|r| &r.boundary[0]) {
+            let (a, b) = (curved(p.uv.x, p.uv.y), curved(p.st.x, p.st.y));
+            assert!((a.x + b.x).abs() < 1e-8 && (a.y - b.y).abs() < 1e-8, "{a} {b}");
+        }
+    }
+}

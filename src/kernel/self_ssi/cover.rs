@@ -12,6 +12,7 @@ use std::rc::Rc;
 use glam::{DVec2, DVec3};
 
 use super::cusp::{CuspEdge, CuspWindow, cusp_window};
+use super::degenerate;
 use super::hull::{Hull, Rect, range};
 use super::march::{Pace, turns};
 use super::miter::{MiterKind, MiterPoint};
@@ -381,6 +382,10 @@ impl<'a> Search<'a> {
         let proved = match (only, inside.next()) {
             (Some((_, m)), None) if m.kind == MiterKind::CrossCap => {
                 cross_cap(&around, &self.sheet.jets(&around), m.null(), m.first, m.second)
+            }
+            (Some((at, m)), None) => {
+                // A copy across a seam: the window moves to the point itself.
+                degenerate::settled(self.sheet, &rect.shifted(m.at - at), m)
             }
             _ => false,
         };

@@ -216,6 +216,28 @@ fn proved(sheet: &Sheet, window: &Rect, around: &Rect, run: &[CuspNode], node: C
     if run.windows(2).any(|s| t(&s[1]) >= low && t(&s[0]) <= high && !s.iter().all(|n| clear.contains(n.at))) {
         return None;
     }
+    match contraction(sheet, window, around, node, across)? {
+        Contraction::WithThird => Some(false),
+        Contraction::InPlane => folded(sheet, window, run, along).then_some(true),
+    }
+}
+
+/// Whether every t of a window has at most one solution (n, k, rho): the test of cuspidal edges, about a node.
+pub(crate) fn uniquely_solved(sheet: &Sheet, window: &Rect, around: &Rect, node: CuspNode, across: DVec2) -> bool {
+    contraction(sheet, window, around, node, across) == Some(Contraction::WithThird)
+}
+
+/// What the Jacobian of F contracts with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Contraction {
+    /// By (n, k, rho).
+    WithThird,
+    /// By (n, k) in the plane of their derivatives.
+    InPlane,
+}
+
+/// Bounds the Jacobian of F over a window, preconditioned at the node.
+fn contraction(sheet: &Sheet, window: &Rect, around: &Rect, node: CuspNode, across: DVec2) -> Option<Contraction> {
     let e = DVec2::from_angle(node.phi);
     let x = e.perp();
     let jet = sheet.jet(node.at, 2);
@@ -275,7 +297,7 @@ fn proved(sheet: &Sheet, window: &Rect, around: &Rect, run: &[CuspNode], node: C
                 row[2] = (c[1] / 6.0 - unit).abs().max((c[0] / 6.0 - unit).abs());
             }
             if contracts(&error) {
-                return Some(false);
+                return Some(Contraction::WithThird);
             }
         }
     }
@@ -288,7 +310,7 @@ fn proved(sheet: &Sheet, window: &Rect, around: &Rect, run: &[CuspNode], node: C
     for (i, row) in error.iter_mut().take(2).enumerate() {
         (row[0], row[1]) = columns(inverse.row(i), i).into();
     }
-    (contracts(&error) && folded(sheet, window, run, along)).then_some(true)
+    contracts(&error).then_some(Contraction::InPlane)
 }
 
 fn well_conditioned(frame: &DMat3) -> bool {

@@ -11,6 +11,9 @@
 use glam::{DMat3, DVec2};
 
 use super::chart::{Chart, Value};
+use super::cusp::CuspNode;
+use super::degenerate::beside;
+use super::miter::MiterPoint;
 use super::sheet::Sheet;
 use crate::kernel::job::Job;
 use crate::kernel::num::linear;
@@ -325,21 +328,27 @@ pub(crate) fn from_miter(sheet: &Sheet, m: DVec2, phi: f64, pace: &Pace, job: &J
     Trace { nodes, ends: [End::Miter(m), end] }
 }
 
-/// The two branches that start in a miter point through which two pass: (u, v, phi) moves by +- `split` for r = 1.
-pub(crate) fn from_crossing(sheet: &Sheet, m: DVec2, phi: f64, split: [f64; 3], pace: &Pace, job: &Job) -> Vec<Trace> {
+/// The branches that start in a degenerate miter point, on either side of it along its kernel direction.
+pub(crate) fn from_degenerate(
+    sheet: &Sheet,
+    miter: &MiterPoint,
+    along: DVec2,
+    sides: [bool; 2],
+    pace: &Pace,
+    job: &Job,
+) -> Vec<Trace> {
     const START: f64 = 1e-3;
-    [1.0, -1.0]
-        .into_iter()
-        .filter_map(|sign| {
-            let s = split.map(|x| x * sign * START);
-            let chart = Chart::Near([m.x + s[0], m.y + s[1], phi + s[2], START]);
-            let (chart, _) = correct(sheet, chart, &[0.0, 0.0, 0.0, 1.0], START)?;
-            let e = DVec2::from_angle(phi);
-            let (mut nodes, end) = one_way(sheet, chart, [e, -e], pace, job);
-            nodes.insert(0, [m, m]);
-            Some(Trace { nodes, ends: [End::Miter(m), end] })
-        })
-        .collect()
+    let node = CuspNode { at: miter.at, phi: miter.phi };
+    let start = |sign: f64| {
+        let found = beside(sheet, node, along, sign * START)?;
+        let chart = Chart::Near([found.at.x, found.at.y, found.phi, found.rho.max(0.0).sqrt()]);
+        let (chart, _) = correct(sheet, chart, &[along.x, along.y, 0.0, 0.0], 2.0 * START)?;
+        let e = DVec2::from_angle(found.phi);
+        let (mut nodes, end) = one_way(sheet, chart, [along * sign + e, along * sign - e], pace, job);
+        nodes.insert(0, [miter.at; 2]);
+        Some(Trace { nodes, ends: [End::Miter(miter.at), end] })
+    };
+    [(sides[0], 1.0), (sides[1], -1.0)].into_iter().filter(|s| s.0).filter_map(|(_, sign)| start(sign)).collect()
 }
 
 /// The branch through a pair that lies on it, both ways. `None` where the pair is singular.

@@ -3,9 +3,8 @@
 //! A cell is done when a window test proves it regular, when the Bezier net of Su x Sv has a direction with which all
 //! its coefficients have a positive product, or when the cross-cap window test proves that it holds one miter point at
 //! most and Newton has found it. Newton works on cos(phi) Su + sin(phi) Sv = 0 in (u, v, phi), whose Jacobian is
-//! regular exactly at cross-caps. At a zero with a singular Jacobian, with kernel n and cokernel w, the system reduces
-//! to a x^2 + b r^2 = 0 with a = w . D^2(n, n), b = w . F_rr: equal signs are an isolated miter point, opposite signs
-//! two branches through one point; a = 0 with zeros on along n is a cusp edge, reported as a curve.
+//! regular exactly at cross-caps. At a zero with a singular Jacobian [`super::degenerate`] tells isolated miter points and
+//! those with two branches; where zeros go on along the kernel they are a cusp edge ([`super::cusp`]), reported as a curve.
 //!
 //! Cost: a few cells for each miter point; a cusp edge is met once and its cells are then skipped.
 
@@ -13,20 +12,21 @@ use glam::{DMat3, DVec2, DVec3};
 
 use super::chart::{Value, near};
 use super::cusp::{CuspEdge, follow};
+use super::degenerate;
 use super::hull::{Hull, Rect, range};
 use super::sheet::Sheet;
 use super::window;
 use crate::kernel::job::Job;
 
 /// What a miter point is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum MiterKind {
     /// Generic: one branch starts here.
     CrossCap,
     /// No branch starts here.
     Isolated,
-    /// Two branches pass through.
-    TwoBranches,
+    /// A branch starts on one or both sides along a direction.
+    Degenerate(DVec2, [bool; 2]),
 }
 
 /// One miter point.
@@ -40,8 +40,8 @@ pub(crate) struct MiterPoint {
     pub first: [DVec3; 2],
     /// Suu, Suv, Svv.
     pub second: [DVec3; 3],
-    /// For two branches: half the motion of (u, v, phi) for r = 1 along either.
-    pub split: [f64; 3],
+    /// For degenerate points: the kernel direction in the domain.
+    pub along: DVec2,
 }
 
 impl MiterPoint {
@@ -177,6 +177,33 @@ fn decided(sheet: &Sheet, piece: usize, rect: &Rect, out: &mut Miters, job: &Job
     }
     let jet = sheet.jet(m, 2);
     let frame = DMat3::from_cols(value.j[0], value.j[1], value.j[2]);
+    if determinant(&frame) < 1e-2 && size <= CUSP_CELL {
+        if let Some(settled) = cusp_here(sheet, y, &frame, out, job) {
+            return settled && beside(&out.cusps);
+        }
+        // Newton stops short of a double zero, where its Jacobian still looks regular: look for the double zero itself.
+        if let Some(double) = degenerate::polish(sheet, y) {
+            let DVec2 { x, y } = double.node.at;
+            let at = DVec2::new(x, y);
+            let known = out.points.iter().position(|k| sheet.wrapped(k.at).distance(sheet.wrapped(at)) < 1e-6);
+            let known = known.or_else(|| {
+                let jet = sheet.jet(at, 2);
+                let point = MiterPoint {
+                    at,
+                    phi: double.node.phi,
+                    kind: double.kind(),
+                    first: jet.d,
+                    second: jet.dd,
+                    along: double.along,
+                };
+                in_domain(sheet, at).then(|| {
+                    out.points.push(point);
+                    out.points.len() - 1
+                })
+            });
+            return known.is_some_and(|k| degenerate::settled(sheet, rect, &out.points[k]));
+        }
+    }
     let generic = is_regular(&frame);
     let known = out.points.iter().any(|k| sheet.wrapped(k.at).distance(sheet.wrapped(m)) < 1e-8);
     let here = in_domain(sheet, m);
@@ -186,27 +213,23 @@ fn decided(sheet: &Sheet, piece: usize, rect: &Rect, out: &mut Miters, job: &Job
         let alone = window::cross_cap(&around, &sheet.jets_on(piece, &around), null, jet.d, jet.dd);
         if here && !known && (alone || size < 1e-3) {
             let kind = MiterKind::CrossCap;
-            out.points.push(MiterPoint { at: m, phi: y[2], kind, first: jet.d, second: jet.dd, split: [0.0; 3] });
+            out.points.push(MiterPoint { at: m, phi: y[2], kind, first: jet.d, second: jet.dd, along: DVec2::ZERO });
         }
         return alone;
     }
-    if size > CUSP_CELL || known {
-        return known && size < 1e-5;
+    false
+}
+
+/// Looks for a cusp edge through a zero: whether it is a new edge, or `None` where zeros do not go on.
+fn cusp_here(sheet: &Sheet, y: [f64; 3], frame: &DMat3, out: &mut Miters, job: &Job) -> Option<bool> {
+    let cusp = follow(sheet, y, frame, job)?;
+    // Where the whole edge is one point it is a pole, not an edge.
+    let s = sheet.point(DVec2::new(y[0], y[1]));
+    let edge = cusp.nodes().iter().any(|c| sheet.point(c.at).distance(s) > 1e-9);
+    if edge {
+        out.cusps.push(cusp);
     }
-    if let Some(cusp) = follow(sheet, y, &frame, job) {
-        // Where the whole edge is one point it is a pole, not an edge.
-        let s = sheet.point(m);
-        if cusp.nodes().iter().any(|c| sheet.point(c.at).distance(s) > 1e-9) {
-            out.cusps.push(cusp);
-            return beside(&out.cusps);
-        }
-        return false;
-    }
-    if here && size < 1e-3 {
-        let (kind, split) = degenerate(sheet, y, &frame);
-        out.points.push(MiterPoint { at: m, phi: y[2], kind, first: jet.d, second: jet.dd, split });
-    }
-    size < 1e-5
+    Some(edge)
 }
 
 /// The cross-cap that Newton finds from a point of the domain; `None` where there is none.
@@ -221,7 +244,7 @@ pub(crate) fn polished(sheet: &Sheet, from: DVec2) -> Option<MiterPoint> {
         kind: MiterKind::CrossCap,
         first: jet.d,
         second: jet.dd,
-        split: [0.0; 3],
+        along: DVec2::ZERO,
     })
 }
 
@@ -261,6 +284,12 @@ fn newton(sheet: &Sheet, from: DVec2) -> Option<([f64; 3], Value)> {
     (value.f.length() <= 1e-11 * scale).then_some((y, value))
 }
 
+/// The determinant over the cube of the longest column.
+fn determinant(frame: &DMat3) -> f64 {
+    let longest = frame.x_axis.length().max(frame.y_axis.length()).max(frame.z_axis.length());
+    if longest > 0.0 { frame.determinant().abs() / longest.powi(3) } else { 0.0 }
+}
+
 /// Whether the miter system's Jacobian is far from singular, both for its columns and in absolute terms (a column that
 /// vanishes but for rounding has a direction, too).
 fn is_regular(frame: &DMat3) -> bool {
@@ -293,25 +322,4 @@ pub(crate) fn kernel(frame: &DMat3) -> DVec3 {
         .max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))
         .unwrap_or(DVec3::X)
         .normalize_or_zero()
-}
-
-/// Tells isolated miter points from those with two branches.
-fn degenerate(sheet: &Sheet, y: [f64; 3], frame: &DMat3) -> (MiterKind, [f64; 3]) {
-    const STEP: f64 = 1e-3;
-    let n = kernel(frame);
-    let w = kernel(&frame.transpose());
-    let f = |x: f64, r: f64| {
-        let z = DVec3::from(y) + n * x;
-        w.dot(near(sheet, z.truncate(), z.z, r).f)
-    };
-    let zero = f(0.0, 0.0);
-    let a = (f(STEP, 0.0) + f(-STEP, 0.0) - 2.0 * zero) / (STEP * STEP);
-    let b = 2.0 * (f(0.0, STEP) - zero) / (STEP * STEP);
-    let scale = frame.x_axis.length().max(frame.y_axis.length()).max(frame.z_axis.length());
-    if a * b < 0.0 && a.abs() > 1e-4 * scale {
-        let along = n * (-b / a).sqrt();
-        (MiterKind::TwoBranches, along.into())
-    } else {
-        (MiterKind::Isolated, [0.0; 3])
-    }
 }

@@ -10,7 +10,7 @@
 //!
 //! Files: `sheet` (the surface prepared), `hull` (bounds of derivatives), `window` (the window proofs), `miter`, `chart`
 //! and `march` (the equation and its tracing), `register` (the branches found), `ternary`, `pair_test` and `cover` (the
-//! search), `quad` and `leaf` (miter quadrangles), `record` (the search as data), `triple` (triple points), `cusp` (cusp edges), `region` and `outline` (coincident areas),
+//! search), `quad` and `leaf` (miter quadrangles), `record` (the search as data), `triple` (triple points), `cusp` (cusp edges), `degenerate` (isolated and double miter points), `region` and `outline` (coincident areas),
 //! `assemble` (the result), `contour` and `section` (a miter neighbourhood cut by a plane), `model` (all surfaces).
 //!
 //! Cost: well under a millisecond for a cross-cap patch, then proportional to the length of the curves over the square
@@ -22,6 +22,7 @@ mod chart;
 mod contour;
 mod cover;
 mod cusp;
+mod degenerate;
 mod hull;
 pub mod leaf;
 mod march;
@@ -316,7 +317,7 @@ fn branches(sheet: &Sheet, miter: &miter::MiterPoint, known: &[Trace], pace: &Pa
     match miter.kind {
         _ if ended => Vec::new(),
         MiterKind::CrossCap => vec![march::from_miter(sheet, miter.at, miter.phi, pace, job)],
-        MiterKind::TwoBranches => march::from_crossing(sheet, miter.at, miter.phi, miter.split, pace, job),
+        MiterKind::Degenerate(along, sides) => march::from_degenerate(sheet, miter, along, sides, pace, job),
         MiterKind::Isolated => Vec::new(),
     }
 }
