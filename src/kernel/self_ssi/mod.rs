@@ -8,7 +8,7 @@
 //! which proves local injectivity only; and the search certifies that no branch was missed ([`Evidence`], and
 //! `unresolved` in the result). Closed directions wrap: a seam is no self-intersection, a curve through it is one curve.
 //!
-//! Files: `sheet` (the surface prepared), `hull` (bounds of derivatives), `window` (the window proofs), `miter`, `chart`
+//! Files: `sheet` (the surface prepared), `hull` and `rational` (bounds of derivatives), `window` (the window proofs), `miter`, `chart`
 //! and `march` (the equation and its tracing), `register` (the branches found), `ternary`, `pair_test` and `cover` (the
 //! search), `quad` and `leaf` (miter quadrangles), `record` (the search as data), `triple` (triple points), `cusp` (cusp edges), `degenerate` (isolated and double miter points), `region` and `outline` (coincident areas),
 //! `assemble` (the result), `contour` and `section` (a miter neighbourhood cut by a plane), `model` (all surfaces).
@@ -31,6 +31,7 @@ pub mod model;
 mod outline;
 mod pair_test;
 mod quad;
+mod rational;
 pub mod record;
 mod region;
 mod register;
