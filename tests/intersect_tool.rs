@@ -39,7 +39,7 @@ fn walled_bowl() -> Document {
     let bowl = Surface::new(knots(), knots(), (0..9).map(at).collect(), None).unwrap();
     let mut document = Document::new(Unit::Metre);
     document.add("bowl", Shape::Surface(Arc::new(bowl)), None);
-    let ring = [(-0.6, -0.5), (0.6, -0.5), (0.6, 0.5), (-0.6, 0.5), (-0.6, -0.5)];
+    let ring = [(-0.6, -0.4), (0.6, -0.4), (0.6, 0.4), (-0.6, 0.4), (-0.6, -0.4)];
     for (k, pair) in ring.windows(2).enumerate() {
         let [a, b] = [pair[0], pair[1]].map(|(x, y)| DVec3::new(x, y, 0.0));
         let (a, b) = (a.lerp(b, 2e-4), b.lerp(a, 2e-4));
@@ -50,18 +50,18 @@ fn walled_bowl() -> Document {
     document
 }
 
+/// The whole path: intersect, keep the curves, pick them as the sides of a patch, heal.
 #[test]
-fn curves_are_found_chosen_kept_and_undone() {
+fn intersect_keep_pick_heal_and_undo() {
     let mut window = opened("surfaces_with_gap.igs");
     window.state_mut().editor.show_document(walled_bowl(), None, "walled bowl".to_owned(), true);
     settle(&mut window);
-    key(&mut window, NONE, Key::Num7);
-    select(&mut window, &["bowl", "wall 0", "wall 1", "wall 2", "wall 3"]);
+    let walls = ["wall 0", "wall 1", "wall 2", "wall 3"];
+    select(&mut window, &["bowl", walls[0], walls[1], walls[2], walls[3]]);
     key(&mut window, NONE, Key::X);
     assert_eq!(prompt(&window), "Intersect · Intersect the two sets");
     key(&mut window, NONE, Key::Enter);
     assert!(window.query_by_label_contains("Complete: no branch is missing").is_some(), "{}", prompt(&window));
-    assert!(window.state().editor.has_found_curves());
     key(&mut window, NONE, Key::N);
     assert_eq!(prompt(&window), "Intersect · Curve 1 chosen");
     assert!(window.query_by_label_contains("Signed gap").is_some());
@@ -69,11 +69,34 @@ fn curves_are_found_chosen_kept_and_undone() {
     assert_eq!(prompt(&window), "Intersect · Click a curve or a point");
     key(&mut window, NONE, Key::K);
     let curves = |window: &Window| window.state().editor.document().curves().count();
-    let found = window.state().editor.found_intersection().unwrap().result.curves.len();
-    assert_eq!(curves(&window), found);
+    assert_eq!(curves(&window), window.state().editor.found_intersection().unwrap().result.curves.len());
 
-    key(&mut window, Modifiers::COMMAND, Key::Z);
-    assert_eq!(curves(&window), 0, "one undo takes all kept curves back");
+    // The walls would hide the curves.
+    key(&mut window, NONE, Key::Escape);
+    select(&mut window, &walls);
+    key(&mut window, NONE, Key::H);
+    key(&mut window, NONE, Key::Num7);
+    key(&mut window, NONE, Key::Home);
+    let entities = window.state().editor.document().entities().to_vec();
+    key(&mut window, NONE, Key::P);
+    for entity in entities.iter().filter(|e| e.curve().is_some()) {
+        pick(&mut window, &entity.name, "curve");
+    }
+    picture(&mut window, "intersect_kept_sides");
+    key(&mut window, NONE, Key::Enter);
+    assert!(prompt(&window).starts_with("Patch · Four sides"), "{}", prompt(&window));
+    key(&mut window, NONE, Key::Enter);
+    assert!(prompt(&window).contains("Healed"), "{}", prompt(&window));
+    key(&mut window, NONE, Key::Enter);
+    let report = window.state().editor.document().patches().next().unwrap().1.report.clone();
+    assert!(report.reached, "{report:?}");
+
+    key(&mut window, NONE, Key::Escape);
+    key(&mut window, NONE, Key::Escape);
+    for _ in 0..3 {
+        key(&mut window, Modifiers::COMMAND, Key::Z);
+    }
+    assert_eq!(curves(&window), 0, "the patch, the hiding and the kept curves are one undo each");
 }
 
 #[test]
