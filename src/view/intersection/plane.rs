@@ -4,12 +4,12 @@ use glam::{DVec2, DVec3};
 
 use super::Found;
 use crate::kernel::job::Job;
-use crate::kernel::self_ssi::section::{MiterSection, SectionOptions, SectionType, miter_section};
+use crate::kernel::self_ssi::section::{MiterSection, SectionEnd, SectionOptions, SectionType, miter_section};
 
 /// How far the neighbourhood reaches, as a part of the domain.
 const REACH: f64 = 0.3;
 /// The largest offset, as a fraction of the size of the model.
-const FARTHEST: f64 = 0.08;
+const FARTHEST: f64 = 0.04;
 
 /// Where the plane is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,9 +62,12 @@ pub fn cut(found: &Found, plane: Plane, job: &Job) -> Result<Cut, String> {
 /// What one sees, in words.
 pub fn words(cut: &Cut) -> String {
     let (curves, crossings) = (cut.section.curves.len(), cut.section.crossings.len());
+    // What leaves the neighbourhood is not the whole of it.
+    let whole = cut.section.curves.iter().all(|c| c.ends == [SectionEnd::Loop; 2]);
     let shape = match (cut.section.kind, curves, crossings) {
         (SectionType::Elliptic, 0, _) if cut.offset == 0.0 => "the point alone",
         (SectionType::Elliptic, 0, _) => "nothing",
+        (SectionType::Elliptic, ..) if !whole => "a figure-8 that leaves the neighbourhood",
         (SectionType::Elliptic, _, 0) => "a closed loop",
         (SectionType::Elliptic, ..) => "a figure-8",
         (SectionType::Hyperbolic, _, 0) if cut.offset == 0.0 => "an X through the point",
@@ -103,6 +106,7 @@ mod tests {
         assert_eq!((found.result.curves.len(), found.result.miters.len()), (1, 1));
         let see = |tilt, offset| words(&cut(&found, Plane { miter: 0, tilt, offset }, &Job::new()).unwrap());
         assert_eq!(see(0.0, 0.5), "Elliptic: a figure-8");
+        assert_eq!(see(0.0, 1.0), "Elliptic: a figure-8 that leaves the neighbourhood");
         assert_eq!(see(0.0, -0.5), "Elliptic: nothing");
         assert_eq!(see(0.0, 0.0), "Elliptic: the point alone");
         assert_eq!(see(70.0, 0.0), "Hyperbolic: an X through the point");
