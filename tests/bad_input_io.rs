@@ -123,6 +123,36 @@ fn one_of_each() -> File {
     let shell = file.add(514, format!("1,{face},1"));
     file.add(186, format!("{shell},1,0"));
     file.add(402, format!("2,{line},{arc}"));
+    // A real outline, a plane, quadrics, ruled and offset surfaces, conics, polylines, a subfigure.
+    let outline: Vec<String> = [[0.1, 0.1], [0.9, 0.1], [0.9, 0.9], [0.1, 0.1]]
+        .windows(2)
+        .map(|p| file.add(110, format!("{:?},{:?},1.,{:?},{:?},1.", p[0][0], p[0][1], p[1][0], p[1][1])).to_string())
+        .collect();
+    let outline = file.add(102, format!("3,{}", outline.join(",")));
+    let point = file.add(116, "0.,0.,1.,0");
+    let axis = file.add(123, "0.,0.,1.");
+    let plane = file.add(190, format!("{point},{axis}"));
+    let on = file.add(142, format!("0,{plane},0,{outline},2"));
+    let trimmed = file.add(144, format!("{plane},1,0,{on}"));
+    let drum = file.add(192, format!("{point},{axis},2."));
+    let rims = [0.0, 1.0].map(|z| file.add(100, format!("{z:?},0.,0.,2.,0.,2.,0.")));
+    let rims = rims.map(|c| file.add(142, format!("0,{drum},0,{c},2")));
+    file.add(144, format!("{drum},1,1,{},{}", rims[0], rims[1]));
+    file.add(196, format!("{point},2."));
+    file.add(198, format!("{point},{axis},3.,1."));
+    let ruled = file.add(118, format!("{line},{arc},0,0"));
+    file.add(140, format!("0.,0.,1.,.5,{ruled}"));
+    file.add_entity(Entity {
+        kind: 104,
+        form: 1,
+        parameters: "1.,0.,4.,0.,0.,-4.,0.,2.,0.,0.,1.".into(),
+        ..Entity::default()
+    });
+    file.add_entity(Entity { kind: 106, form: 12, parameters: "2,2,0.,0.,0.,1.,1.,1.".into(), ..Entity::default() });
+    let subfigure = file.add(308, format!("0,1Hs,1,{trimmed}"));
+    for place in ["0.,0.,9.,1.", "0.,0.,9.,2."] {
+        file.add(408, format!("{subfigure},{place}"));
+    }
     file.add(110, "5.,0.,0.,1.,0.,0.");
     file
 }
@@ -130,7 +160,7 @@ fn one_of_each() -> File {
 #[test]
 fn a_file_with_one_of_each_is_read_whole() {
     let opened = read_iges(one_of_each().text().as_bytes()).unwrap();
-    assert_eq!((opened.report.surfaces, opened.report.curves), (4, 3), "{:?}", opened.report.lines);
+    assert_eq!((opened.report.surfaces, opened.report.curves), (12, 5), "{:?}", opened.report.lines);
 }
 
 #[test]

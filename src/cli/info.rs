@@ -9,8 +9,8 @@ use crate::io::{self, ImportReport, Severity};
 use crate::kernel::geom::{Aabb, Knots};
 use crate::kernel::mesh::facets::{FacetCurve, FacetCurveKind, Facets};
 use crate::kernel::mesh::grid::Grid;
-use crate::model::borders::{Meets, borders};
 use crate::model::document::{Document, Entity, Shape};
+use crate::model::topology::{Meets, edges};
 
 /// Arguments of `info`.
 #[derive(Debug, clap::Args)]
@@ -27,11 +27,13 @@ struct Info {
     file: String,
     unit: &'static str,
     surfaces: usize,
+    /// Of the surfaces, those that are trimmed.
+    faces: usize,
     curves: usize,
     patches: usize,
     meshes: usize,
     bounds: Option<Bounds>,
-    /// How the borders of the whole surfaces meet.
+    /// How edges of faces and borders of whole surfaces meet.
     borders: BorderInfo,
     entities: Vec<EntityInfo>,
     import: ImportReport,
@@ -56,7 +58,7 @@ impl Bounds {
 
 #[derive(Default, Serialize)]
 struct BorderInfo {
-    /// What two borders may be apart and still be one.
+    /// What two edges may be apart and still be one.
     joining: f64,
     free: usize,
     /// Along others on a part of their length.
@@ -72,8 +74,8 @@ impl BorderInfo {
     fn of(document: &Document) -> Self {
         let tolerances = document.tolerances();
         let mut info = Self { joining: tolerances.joining, ..Self::default() };
-        for border in borders(document, tolerances.joining) {
-            match border.meets {
+        for edge in edges(document, tolerances.joining, &super::job()) {
+            match edge.meets {
                 Meets::Free => info.free += 1,
                 Meets::Pole => info.poles += 1,
                 Meets::Partly { .. } => info.partly += 1,
@@ -189,6 +191,7 @@ impl EntityInfo {
     fn of(entity: &Entity, number: usize, all: bool) -> Self {
         let (kind, knots, rational): (_, Vec<&Knots>, _) = match &entity.shape {
             Shape::Surface(s) => ("surface", s.knots().iter().collect(), s.weights().is_some()),
+            Shape::Face(f) => ("face", f.surface().knots().iter().collect(), f.surface().weights().is_some()),
             Shape::Patch(p) => ("patch", p.surface.knots().iter().collect(), p.surface.weights().is_some()),
             Shape::Curve(c) => ("curve", vec![c.knots()], c.weights().is_some()),
             Shape::Mesh(_) => ("mesh", Vec::new(), false),
@@ -243,7 +246,7 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         .iter()
         .map(|entity| {
             let number = match entity.shape {
-                Shape::Surface(_) => &mut numbers[0],
+                Shape::Surface(_) | Shape::Face(_) => &mut numbers[0],
                 Shape::Curve(_) => &mut numbers[1],
                 Shape::Patch(_) => &mut numbers[2],
                 Shape::Mesh(_) | Shape::Block(_) => &mut numbers[3],
@@ -264,7 +267,7 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
     let border = BorderInfo::of(document);
     if surfaces > 0 {
         common.say(format!(
-            "borders of the whole surfaces, joined within {:.3e}: {} free, {} partly shared, {} shared ({} with gaps, the \
+            "edges, joined within {:.3e}: {} free, {} partly shared, {} shared ({} with gaps, the \
              largest {:.3e}), {} poles",
             border.joining, border.free, border.partly, border.shared, border.gaps, border.largest_gap, border.poles
         ));
@@ -289,6 +292,7 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         file: args.file.display().to_string(),
         unit,
         surfaces,
+        faces: document.faces().count(),
         curves,
         patches,
         meshes,

@@ -153,6 +153,7 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
     }
     let gpu = Gpu::headless()?;
     let mut scene = Scene::default();
+    scene.show_whole_surfaces(args.show.contains(&Show::Untrimmed));
     scene.sync(&document);
     let view = view(args, &document, &mut scene)?;
 

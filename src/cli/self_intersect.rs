@@ -1,10 +1,13 @@
 //! `patchwright self-intersect FILE [--surface N]`: where surfaces meet themselves, with their miter points.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::{CliError, Common, Exit, ProgressLine};
+use crate::kernel::geom::trim::Sheet;
 use crate::kernel::self_ssi::SelfIntersectOptions;
 use crate::kernel::self_ssi::model::{merged, self_intersect_all};
+use crate::kernel::ssi::clip::clip;
 use crate::kernel::ssi::result::{CurveEnd, CurveKind, Intersection};
 
 /// Arguments of `self-intersect`.
@@ -24,6 +27,7 @@ pub struct Args {
 pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
     let opened = crate::io::open(&args.file)?;
     let surfaces: Vec<_> = opened.document.surfaces().map(|(_, surface)| surface.clone()).collect();
+    let sheets: Vec<Sheet> = opened.document.sheets().map(|(_, sheet)| sheet).collect();
     let numbers = match args.surface {
         Some(n) if n < surfaces.len() => n..n + 1,
         Some(n) => {
@@ -41,7 +45,11 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
     let progress = ProgressLine::watch(&job);
     let options = SelfIntersectOptions { tol: args.tol, ..SelfIntersectOptions::default() };
     let chosen: Vec<_> = numbers.filter_map(|n| surfaces.get(n).map(|s| (n, s))).collect();
-    let all = merged(self_intersect_all(&chosen, &options, &job)?.into_iter().map(|found| found.result));
+    let mut all = merged(self_intersect_all(&chosen, &options, &job)?.into_iter().map(|found| found.result));
+    clip(&mut all, &|number| match sheets.get(number) {
+        Some(Sheet::Trimmed(face)) => Some(Arc::clone(face)),
+        _ => None,
+    });
     drop(progress);
     for warning in job.warnings() {
         common.warn(warning);

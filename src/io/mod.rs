@@ -12,6 +12,7 @@ use crate::model::traces::SurfaceTrace;
 
 pub(crate) mod atomic;
 pub mod autosave;
+mod color;
 mod discrete;
 pub mod export;
 mod format;

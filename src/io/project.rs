@@ -6,16 +6,17 @@
 //! ])
 //! ```
 //!
-//! Version 2 added meshes and blocks; projects of version 1 are read. Numbers are written so that they read back bit for bit. A file of a later version is refused by its number;
+//! Version 2 added trimmed faces, meshes and blocks; projects of version 1 are read. Numbers are written so that they read back bit for bit. A file of a later version is refused by its number;
 //! an entity whose numbers make no curve or surface is reported and loses itself only.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::{ImportReport, Opened, Severity};
+use crate::kernel::geom::trim::{EdgeRole, Face, FaceEdge, Ring, SurfaceKind};
 use crate::kernel::geom::{Curve, Knots, Surface};
 use crate::kernel::mesh::facets::{Facets, FacetsData};
 use crate::model::document::{Document, Entity, EntityId, Patch, Shape, Unit};
@@ -79,10 +80,42 @@ struct EntityOut<'a> {
 #[derive(Serialize)]
 enum ShapeOut<'a> {
     Surface(&'a Surface),
+    Face(FaceOut<'a>),
     Curve(&'a Curve),
     Patch(PatchOut<'a>),
     Mesh(&'a Facets),
     Block(&'a Facets),
+}
+
+#[derive(Serialize)]
+struct FaceOut<'a> {
+    surface: &'a Surface,
+    kind: SurfaceKind,
+    loops: Vec<Vec<FaceEdgeOut<'a>>>,
+}
+
+/// Edges that faces share are written with every face, and are one again by their number when they are read.
+#[derive(Serialize)]
+struct FaceEdgeOut<'a> {
+    id: u64,
+    curve: &'a Curve,
+    pcurve: &'a Curve,
+    reversed: bool,
+    role: EdgeRole,
+}
+
+impl<'a> FaceOut<'a> {
+    fn of(face: &'a Face) -> Self {
+        let edge = |e: &'a FaceEdge| FaceEdgeOut {
+            id: e.id,
+            curve: &e.curve,
+            pcurve: &e.pcurve,
+            reversed: e.reversed,
+            role: e.role,
+        };
+        let loops = face.rings().iter().map(|r| r.edges.iter().map(edge).collect()).collect();
+        Self { surface: face.surface(), kind: face.kind, loops }
+    }
 }
 
 #[derive(Serialize)]
@@ -118,6 +151,7 @@ struct EntityIn {
 #[derive(Deserialize)]
 enum ShapeIn {
     Surface(SurfaceIn),
+    Face(FaceIn),
     Curve(CurveIn),
     Patch(Box<PatchIn>),
     Mesh(FacetsData),
@@ -149,6 +183,56 @@ struct CurveIn {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+struct FaceIn {
+    surface: SurfaceIn,
+    #[serde(default)]
+    kind: SurfaceKind,
+    loops: Vec<Vec<FaceEdgeIn>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FaceEdgeIn {
+    id: u64,
+    curve: CurveIn,
+    pcurve: CurveIn,
+    #[serde(default)]
+    reversed: bool,
+    #[serde(default)]
+    role: EdgeRole,
+}
+
+/// Edges by number, so that faces which share one share it again.
+type Edges = HashMap<u64, Arc<Curve>>;
+
+impl FaceIn {
+    fn checked(self, edges: &mut Edges) -> Result<Face, String> {
+        let surface = self.surface.checked()?;
+        let mut rings = Vec::with_capacity(self.loops.len());
+        for ring in self.loops {
+            let mut out = Ring::default();
+            for edge in ring {
+                let (curve, pcurve) = (edge.curve.checked()?, edge.pcurve.checked()?);
+                let known = edges.entry(edge.id).or_insert_with(|| Arc::new(curve.clone()));
+                let curve = if **known == curve { Arc::clone(known) } else { Arc::new(curve) };
+                let (reversed, role) = (edge.reversed, edge.role);
+                out.edges.push(FaceEdge { id: edge.id, curve, pcurve, reversed, role });
+            }
+            rings.push(out);
+        }
+        Face::new(surface, rings, self.kind).map_err(|e| e.to_string())
+    }
+}
+
+impl CurveIn {
+    fn checked(self) -> Result<Curve, String> {
+        let knots = Knots::new(self.knots.degree, self.knots.values).map_err(|e| format!("knots: {e}"))?;
+        Curve::new(knots, self.points, self.weights).map_err(|e| e.to_string())
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct PatchIn {
     surface: SurfaceIn,
     spec: PatchSpec,
@@ -168,6 +252,7 @@ impl ShapeIn {
     fn kind(&self) -> &'static str {
         match self {
             Self::Surface(_) => "surface",
+            Self::Face(_) => "face",
             Self::Curve(_) => "curve",
             Self::Patch(_) => "patch",
             Self::Mesh(_) => "mesh",
@@ -175,13 +260,11 @@ impl ShapeIn {
         }
     }
 
-    fn checked(self) -> Result<Shape, String> {
+    fn checked(self, edges: &mut Edges) -> Result<Shape, String> {
         Ok(match self {
             Self::Surface(surface) => Shape::Surface(surface.checked()?),
-            Self::Curve(curve) => {
-                let knots = Knots::new(curve.knots.degree, curve.knots.values).map_err(|e| format!("knots: {e}"))?;
-                Shape::Curve(Arc::new(Curve::new(knots, curve.points, curve.weights).map_err(|e| e.to_string())?))
-            }
+            Self::Face(face) => Shape::Face(Arc::new(face.checked(edges)?)),
+            Self::Curve(curve) => Shape::Curve(Arc::new(curve.checked()?)),
             Self::Mesh(data) => Shape::Mesh(Arc::new(Facets::try_from(data).map_err(|e| e.to_string())?)),
             Self::Block(data) => Shape::Block(Arc::new(Facets::try_from(data).map_err(|e| e.to_string())?)),
             Self::Patch(patch) => {
@@ -216,6 +299,7 @@ impl<'a> EntityOut<'a> {
     fn of(entity: &'a Entity) -> Self {
         let shape = match &entity.shape {
             Shape::Surface(surface) => ShapeOut::Surface(surface),
+            Shape::Face(face) => ShapeOut::Face(FaceOut::of(face)),
             Shape::Curve(curve) => ShapeOut::Curve(curve),
             Shape::Mesh(facets) => ShapeOut::Mesh(facets),
             Shape::Block(facets) => ShapeOut::Block(facets),
@@ -246,11 +330,12 @@ pub fn read(bytes: &[u8]) -> Result<Opened, ProjectError> {
     let mut report = ImportReport::default();
     let mut entities = Vec::with_capacity(project.entities.len());
     let mut taken = HashSet::new();
+    let mut edges = Edges::new();
     let mut next_id = project.next_id.max(project.entities.iter().map(|e| e.id.saturating_add(1)).max().unwrap_or(0));
     for (at, entity) in project.entities.into_iter().enumerate() {
         let kind = entity.shape.kind();
         *report.found.entry(kind.into()).or_default() += 1;
-        let shape = match entity.shape.checked() {
+        let shape = match entity.shape.checked(&mut edges) {
             Ok(shape) => shape,
             Err(reason) => {
                 report.add(Severity::Skipped, kind, Some(at), None, format!("`{}`: {reason}", entity.name));

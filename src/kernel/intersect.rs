@@ -2,7 +2,7 @@
 //! results can be laid over one another.
 //!
 //! [`Engine::Bvh`] works on the exact surfaces and certifies that no branch is missing (thesis chapter 5); it needs
-//! parametric bodies. [`Engine::Mesh`] works on triangulations (HJR99 section 4); it takes meshes and blocks too.
+//! parametric bodies. Of trimmed faces the part inside their loops counts. [`Engine::Mesh`] works on triangulations (HJR99 section 4); it takes meshes and blocks too.
 
 use std::sync::Arc;
 
@@ -10,6 +10,7 @@ use super::geom::Surface;
 use super::job::Job;
 use super::mesh::body::Body;
 use super::mesh_ssi::engine::{MeshSsiError, MeshSsiOptions, intersect_bodies};
+use super::ssi::clip::clip;
 use super::ssi::{Intersection, SsiError, SsiOptions};
 
 /// Which engine.
@@ -55,19 +56,27 @@ pub fn intersect_with(
     tol: Option<f64>,
     job: &Job,
 ) -> Result<Intersection, IntersectError> {
-    match engine {
+    let mut result = match engine {
         Engine::Bvh => {
             let (a, b) = (parametric(a)?, parametric(b)?);
-            Ok(super::ssi::intersect(&borrowed(&a), &borrowed(&b), &SsiOptions { tol, ..SsiOptions::default() }, job)?)
+            super::ssi::intersect(&borrowed(&a), &borrowed(&b), &SsiOptions { tol, ..SsiOptions::default() }, job)?
         }
-        Engine::Mesh => Ok(intersect_bodies(a, b, &MeshSsiOptions { tol, ..MeshSsiOptions::default() }, job)?),
-    }
+        Engine::Mesh => intersect_bodies(a, b, &MeshSsiOptions { tol, ..MeshSsiOptions::default() }, job)?,
+    };
+    // Both engines work on whole surfaces.
+    clip(&mut result, &|number| {
+        a.iter().chain(b).find_map(|(n, body)| match body {
+            Body::Face(face) if *n == number => Some(Arc::clone(face)),
+            _ => None,
+        })
+    });
+    Ok(result)
 }
 
 fn parametric(bodies: &[(usize, Body)]) -> Result<Vec<(usize, Arc<Surface>)>, IntersectError> {
-    let one = |(number, body): &(usize, Body)| match body {
-        Body::Surface(surface) => Ok((*number, Arc::clone(surface))),
-        Body::Facets(_) => Err(IntersectError::NotParametric { number: *number }),
+    let one = |(number, body): &(usize, Body)| match body.surface() {
+        Some(surface) => Ok((*number, Arc::clone(surface))),
+        None => Err(IntersectError::NotParametric { number: *number }),
     };
     bodies.iter().map(one).collect()
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+use crate::kernel::geom::trim::{Face, Sheet};
 use crate::kernel::geom::{Aabb, Curve, Surface};
 use crate::kernel::mesh::body::Body;
 use crate::kernel::mesh::facets::Facets;
@@ -65,6 +66,8 @@ impl Unit {
 pub enum Shape {
     /// A surface of the model.
     Surface(Arc<Surface>),
+    /// A trimmed face of the model.
+    Face(Arc<Face>),
     /// A free curve of the model.
     Curve(Arc<Curve>),
     /// A healed patch: its surface, how it was asked for, and the evidence.
@@ -105,10 +108,11 @@ pub struct Entity {
 }
 
 impl Entity {
-    /// The surface of a surface or patch.
+    /// The surface of a surface or patch; of a face the whole surface under it.
     pub fn surface(&self) -> Option<&Arc<Surface>> {
         match &self.shape {
             Shape::Surface(surface) => Some(surface),
+            Shape::Face(face) => Some(face.surface()),
             Shape::Patch(patch) => Some(&patch.surface),
             Shape::Curve(_) | Shape::Mesh(_) | Shape::Block(_) => None,
         }
@@ -119,6 +123,22 @@ impl Entity {
         match &self.shape {
             Shape::Mesh(facets) | Shape::Block(facets) => Some(facets),
             _ => None,
+        }
+    }
+
+    /// The face of a face.
+    pub fn face(&self) -> Option<&Arc<Face>> {
+        match &self.shape {
+            Shape::Face(face) => Some(face),
+            _ => None,
+        }
+    }
+
+    /// The part of a surface that is there: all of it, or a face on it.
+    pub fn sheet(&self) -> Option<Sheet> {
+        match &self.shape {
+            Shape::Face(face) => Some(Sheet::Trimmed(Arc::clone(face))),
+            _ => self.surface().map(|s| Sheet::Whole(Arc::clone(s))),
         }
     }
 
@@ -134,6 +154,7 @@ impl Entity {
     pub fn bounds(&self) -> Aabb {
         match &self.shape {
             Shape::Surface(surface) => surface.bounds(),
+            Shape::Face(face) => face.bounds(),
             Shape::Curve(curve) => curve.bounds(),
             Shape::Patch(patch) => patch.surface.bounds(),
             Shape::Mesh(facets) | Shape::Block(facets) => facets.bounds(),
@@ -178,12 +199,28 @@ impl Document {
         self.entities.iter().find(|e| e.id == id)
     }
 
-    /// The original surfaces in file order: a surface's number on the command line is its place here.
+    /// The original surfaces in file order, whole, those under faces among them: a surface's number on the command line
+    /// is its place here.
     pub fn surfaces(&self) -> impl Iterator<Item = (EntityId, &Arc<Surface>)> {
         self.entities.iter().filter_map(|e| match &e.shape {
             Shape::Surface(surface) => Some((e.id, surface)),
+            Shape::Face(face) => Some((e.id, face.surface())),
             _ => None,
         })
+    }
+
+    /// The same surfaces, of faces the trimmed part only.
+    pub fn sheets(&self) -> impl Iterator<Item = (EntityId, Sheet)> {
+        self.entities.iter().filter_map(|e| match &e.shape {
+            Shape::Surface(surface) => Some((e.id, Sheet::Whole(Arc::clone(surface)))),
+            Shape::Face(face) => Some((e.id, Sheet::Trimmed(Arc::clone(face)))),
+            _ => None,
+        })
+    }
+
+    /// The trimmed faces.
+    pub fn faces(&self) -> impl Iterator<Item = (EntityId, &Arc<Face>)> {
+        self.entities.iter().filter_map(|e| e.face().map(|f| (e.id, f)))
     }
 
     /// The free curves in file order: `Curve(id)` of a patch specification counts these.
@@ -199,7 +236,7 @@ impl Document {
     /// All originals that can be projected on or intersected, in the order of their numbers: first the surfaces,
     /// then meshes and blocks.
     pub fn bodies(&self) -> impl Iterator<Item = (EntityId, Body)> {
-        let surfaces = self.surfaces().map(|(id, s)| (id, Body::Surface(Arc::clone(s))));
+        let surfaces = self.sheets().map(|(id, sheet)| (id, Body::from(sheet)));
         surfaces.chain(self.meshes().map(|(id, f)| (id, Body::Facets(Arc::clone(f)))))
     }
 

@@ -1,6 +1,5 @@
 //! What a user has: documents, the commands that change them, and undo.
 
-pub mod borders;
 pub mod command;
 pub mod document;
 pub mod examples;
@@ -10,4 +9,5 @@ pub mod replay;
 pub mod resolve;
 pub mod selection;
 pub mod spec;
+pub mod topology;
 pub mod traces;

@@ -58,7 +58,7 @@ pub enum PieceError {
         count: usize,
     },
     /// The surface has no such loop or edge.
-    #[error("surface {surface} has no loop {ring}, edge {edge}: untrimmed surfaces have loop 0 with edges 0 to 3")]
+    #[error("surface {surface} has no loop {ring}, edge {edge}: {has}")]
     NoEdge {
         /// The surface.
         surface: usize,
@@ -66,6 +66,8 @@ pub enum PieceError {
         ring: usize,
         /// The edge asked for.
         edge: usize,
+        /// What it has.
+        has: String,
     },
     /// A parameter or fraction is outside.
     #[error("{what} is {got}, it must be in {low}..={high}")]
@@ -126,7 +128,7 @@ pub enum ResolveError {
 pub struct Resolved {
     /// The patches.
     pub patches: Vec<PatchInput>,
-    /// The bodies to project on, with their numbers.
+    /// The bodies to project on, of faces the trimmed part, with their numbers.
     pub surfaces: Vec<(usize, Body)>,
     /// How to heal.
     pub options: HealOptions,
@@ -229,11 +231,7 @@ impl<'a> PieceResolver<'a> {
     pub fn curve(&mut self, piece: &Piece, job: &Job) -> Result<Curve, PieceError> {
         match piece {
             Piece::Iso { surface, at, from, to } => self.iso(*surface, *at, *from, *to),
-            Piece::Edge { face, ring, edge, from, to } => {
-                let side = Side::ALL.get(*edge).filter(|_| *ring == 0);
-                let side = side.ok_or(PieceError::NoEdge { surface: *face, ring: *ring, edge: *edge })?;
-                by_fractions(&self.surface(*face)?.border(*side)?, *from, *to)
-            }
+            Piece::Edge { face, ring, edge, from, to } => by_fractions(&self.edge(*face, *ring, *edge)?, *from, *to),
             Piece::Curve { id, from, to } => {
                 let curves: Vec<&Arc<Curve>> = self.document.curves().map(|(_, c)| c).collect();
                 let curve = curves.get(*id).ok_or(PieceError::NoCurve { number: *id, count: curves.len() })?;
@@ -264,6 +262,24 @@ impl<'a> PieceResolver<'a> {
         let count = self.document.surfaces().count();
         let found = self.document.surfaces().nth(number).map(|(_, s)| s);
         found.ok_or(PieceError::NoSurface { number, count })
+    }
+
+    /// An edge of a face, or a border of an untrimmed surface.
+    fn edge(&self, number: usize, ring: usize, edge: usize) -> Result<Curve, PieceError> {
+        let surface = self.surface(number)?;
+        let no_edge = |has: String| PieceError::NoEdge { surface: number, ring, edge, has };
+        match self.document.bodies().nth(number) {
+            Some((_, Body::Face(face))) => {
+                let found = face.edge(ring, edge).map(|e| e.curve.as_ref().clone());
+                let counts: Vec<usize> = face.rings().iter().map(|r| r.edges.len()).collect();
+                found.ok_or_else(|| no_edge(format!("its loops have {counts:?} edges, each numbered from 0")))
+            }
+            _ => {
+                let side = Side::ALL.get(edge).filter(|_| ring == 0);
+                let has = "untrimmed surfaces have loop 0 with edges 0 to 3";
+                Ok(surface.border(*side.ok_or_else(|| no_edge(has.into()))?)?)
+            }
+        }
     }
 
     fn iso(&self, number: usize, at: IsoAt, from: f64, to: f64) -> Result<Curve, PieceError> {

@@ -40,6 +40,7 @@ pub enum Action {
     Xray,
     Edges,
     IsoLines,
+    WholeSurfaces,
     Section,
     LightTheme,
     DarkTheme,
@@ -266,6 +267,14 @@ pub const ACTIONS: &[Info] = &[
     with(Icon::Xray, entry(Action::Xray, View, 2, "X-ray", key(ALT, Key::Num3), "Let what is behind shine through")),
     with(Icon::Edges, entry(Action::Edges, View, 3, "Edges", key(ALT, Key::E), "Draw the edges of the surfaces")),
     with(Icon::Iso, entry(Action::IsoLines, View, 3, "Iso-lines", key(ALT, Key::I), "Draw lines of constant u and v")),
+    entry(
+        Action::WholeSurfaces,
+        View,
+        3,
+        "Untrimmed surfaces",
+        key(ALT, Key::U),
+        "Draw the whole surfaces under trimmed faces",
+    ),
     with(
         Icon::Section,
         entry(

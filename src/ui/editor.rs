@@ -14,11 +14,11 @@ use super::settings::{Settings, Theme};
 use super::tools::{PickList, Tool};
 use super::viewport::Viewport;
 use crate::io::autosave::Recovery;
-use crate::model::borders::{self, SeamGaps};
 use crate::model::command::Command;
 use crate::model::document::{Document, EntityId, Shape};
 use crate::model::history::History;
 use crate::model::selection::Selection;
+use crate::model::topology::{self, SeamGaps};
 use crate::view::camera::{Axis, Projection};
 use crate::view::intersection::Task;
 use crate::view::pick::Filter;
@@ -180,6 +180,7 @@ impl Editor {
             Action::Hide => self.visibility(VisibilityKey::Hide).map(|_| ()),
             Action::Isolate => self.visibility(VisibilityKey::Isolate).map(|_| ()),
             Action::ShowAll => self.visibility(VisibilityKey::ShowAll).map(|_| ()),
+            Action::WholeSurfaces => need(self.document().faces().next().is_some(), "there is no trimmed face"),
             Action::PatchTool => need(self.document().bodies().next().is_some(), "there is nothing to heal"),
             Action::AdjustPatch => {
                 let one = match self.selection.ids() {
@@ -220,6 +221,7 @@ impl Editor {
             Action::Xray => display.xray,
             Action::Edges => display.edges,
             Action::IsoLines => display.isolines,
+            Action::WholeSurfaces => self.viewport.scene.shows_whole_surfaces(),
             Action::Section => self.viewport.section.is_some(),
             Action::LightTheme => self.settings.theme == Theme::Light,
             Action::DarkTheme => self.settings.theme == Theme::Dark,
@@ -321,6 +323,7 @@ impl Editor {
             }
             Action::Edges => self.viewport.display.edges ^= true,
             Action::IsoLines => self.viewport.display.isolines ^= true,
+            Action::WholeSurfaces => self.viewport.toggle_whole_surfaces(),
             Action::Section => self.viewport.toggle_section(&visible_bounds(self.history.document())),
             Action::LightTheme => self.set_theme(ctx, Theme::Light),
             Action::DarkTheme => self.set_theme(ctx, Theme::Dark),
@@ -381,7 +384,7 @@ impl Editor {
         let revision = self.history.revision();
         if self.seams.as_ref().is_none_or(|(of, _)| *of != revision) {
             let document = self.document();
-            self.seams = Some((revision, borders::seam_gaps(document, document.tolerances().joining)));
+            self.seams = Some((revision, topology::seam_gaps(document, document.tolerances().joining)));
         }
         self.seams.as_ref().map_or(Vec::new(), |(_, gaps)| gaps.clone())
     }

@@ -2,7 +2,8 @@
 //!
 //! A surface is one tensor grid over all its patches, so no crack can open between them, and its border and
 //! iso-lines are grid lines, so they lie in the triangles and cover them exactly. A free curve is a polyline that
-//! keeps the same chord tolerance, by the second derivative between samples.
+//! keeps the same chord tolerance, by the second derivative between samples. A trimmed face is a constrained Delaunay
+//! triangulation whose edges are the same points for both neighbours; its iso-lines are those inside its loops.
 
 use std::sync::Arc;
 
@@ -10,9 +11,13 @@ use glam::{DVec2, DVec3};
 
 use super::facet_shading::shaded;
 use super::segment_tree::{Segment, SegmentTree};
+use crate::kernel::geom::trim::{EdgeRole, Face};
 use crate::kernel::geom::{Aabb, Curve, Direction, Knots, Side, Surface};
+use crate::kernel::mesh::face_mesh::tessellate_face;
 use crate::kernel::mesh::facets::{FacetCurve, FacetCurveKind, Facets};
-use crate::kernel::mesh::tessellate::{SurfaceMesh, TessellateOptions, grid_lines, tessellate_on};
+use crate::kernel::mesh::tessellate::{
+    SurfaceMesh, TessellateOptions, add_lines, curve_parameters, grid_lines, tessellate_on,
+};
 use crate::kernel::mesh::tri_tree::TriTree;
 use crate::model::document::EntityId;
 
@@ -34,6 +39,8 @@ pub enum CurveRef {
     Free(EntityId),
     /// A border of a surface.
     Border(EntityId, Side),
+    /// An edge of a trimmed face: its loop and its place there.
+    Edge(EntityId, u32, u32),
     /// An iso-curve of a surface: the direction that is fixed and its value.
     Iso(EntityId, Direction, f64),
     /// A border or feature edge of a mesh, or a border line of a block, by its place among its curves.
@@ -46,7 +53,12 @@ impl CurveRef {
     /// The entity it belongs to.
     pub fn entity(&self) -> EntityId {
         match *self {
-            Self::Free(id) | Self::Border(id, _) | Self::Iso(id, ..) | Self::Chain(id, _) | Self::GridLine(id, _) => id,
+            Self::Free(id)
+            | Self::Border(id, _)
+            | Self::Edge(id, ..)
+            | Self::Iso(id, ..)
+            | Self::Chain(id, _)
+            | Self::GridLine(id, _) => id,
         }
     }
 
@@ -61,6 +73,13 @@ impl CurveRef {
 pub enum Geometry {
     /// A surface or healed patch.
     Surface(Arc<Surface>),
+    /// A trimmed face; `whole` draws the whole surface under it as well.
+    Face {
+        /// The face.
+        face: Arc<Face>,
+        /// Whether the whole surface is drawn.
+        whole: bool,
+    },
     /// A free curve.
     Curve(Arc<Curve>),
     /// A mesh or block.
@@ -72,8 +91,19 @@ impl Geometry {
     pub fn bounds(&self) -> Aabb {
         match self {
             Self::Surface(surface) => surface.bounds(),
+            Self::Face { face, whole: false } => face.bounds(),
+            Self::Face { face, whole: true } => face.surface().bounds(),
             Self::Curve(curve) => curve.bounds(),
             Self::Facets(facets) => facets.bounds(),
+        }
+    }
+
+    /// The whole surface of a surface or face.
+    pub fn surface(&self) -> Option<&Arc<Surface>> {
+        match self {
+            Self::Surface(surface) => Some(surface),
+            Self::Face { face, .. } => Some(face.surface()),
+            Self::Facets(_) | Self::Curve(_) => None,
         }
     }
 
@@ -94,6 +124,7 @@ impl Geometry {
     pub fn same(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Surface(a), Self::Surface(b)) => Arc::ptr_eq(a, b),
+            (Self::Face { face: a, whole: w }, Self::Face { face: b, whole: v }) => Arc::ptr_eq(a, b) && w == v,
             (Self::Curve(a), Self::Curve(b)) => Arc::ptr_eq(a, b),
             (Self::Facets(a), Self::Facets(b)) => Arc::ptr_eq(a, b),
             _ => false,
@@ -104,19 +135,25 @@ impl Geometry {
     pub fn curve_domain(&self, curve: &CurveRef) -> Option<[f64; 2]> {
         match (self, curve) {
             (Self::Curve(c), CurveRef::Free(_)) => Some(c.domain()),
-            (Self::Surface(s), CurveRef::Border(_, Side::VMin | Side::VMax) | CurveRef::Iso(_, Direction::V, _)) => {
-                Some(s.domain()[0])
+            (Self::Face { face, .. }, CurveRef::Edge(_, ring, edge)) => {
+                Some(face.edge(*ring as usize, *edge as usize)?.curve.domain())
             }
-            (Self::Surface(s), CurveRef::Border(..) | CurveRef::Iso(..)) => Some(s.domain()[1]),
+            (_, CurveRef::Border(_, Side::VMin | Side::VMax) | CurveRef::Iso(_, Direction::V, _)) => {
+                Some(self.surface()?.domain()[0])
+            }
+            (_, CurveRef::Border(..) | CurveRef::Iso(..)) => Some(self.surface()?.domain()[1]),
             _ => self.facet_curve(curve).map(|c| c.curve.domain()),
         }
     }
 
     /// The surface parameters of a point of one of its curves.
     pub fn curve_uv(&self, curve: &CurveRef, t: f64) -> Option<DVec2> {
-        let Self::Surface(surface) = self else { return None };
-        let [u, v] = surface.domain();
+        let [u, v] = self.surface()?.domain();
         match *curve {
+            CurveRef::Edge(_, ring, edge) => {
+                let Self::Face { face, .. } = self else { return None };
+                Some(face.edge(ring as usize, edge as usize)?.uv(t))
+            }
             CurveRef::Border(_, Side::VMin) => Some(DVec2::new(t, v[0])),
             CurveRef::Border(_, Side::UMax) => Some(DVec2::new(u[1], t)),
             CurveRef::Border(_, Side::VMax) => Some(DVec2::new(t, v[1])),
@@ -131,8 +168,11 @@ impl Geometry {
     pub fn curve(&self, curve: &CurveRef) -> Option<Curve> {
         match (self, curve) {
             (Self::Curve(c), CurveRef::Free(_)) => Some(c.as_ref().clone()),
-            (Self::Surface(s), CurveRef::Border(_, side)) => s.border(*side).ok(),
-            (Self::Surface(s), CurveRef::Iso(_, fixed, c)) => s.iso_curve(*fixed, *c).ok(),
+            (Self::Face { face, .. }, CurveRef::Edge(_, ring, edge)) => {
+                Some(face.edge(*ring as usize, *edge as usize)?.curve.as_ref().clone())
+            }
+            (_, CurveRef::Border(_, side)) => self.surface()?.border(*side).ok(),
+            (_, CurveRef::Iso(_, fixed, c)) => self.surface()?.iso_curve(*fixed, *c).ok(),
             _ => self.facet_curve(curve).map(|c| c.curve.clone()),
         }
     }
@@ -141,10 +181,20 @@ impl Geometry {
     pub fn curve_knots(&self, curve: &CurveRef) -> Vec<f64> {
         let knots = match (self, curve) {
             (Self::Curve(c), CurveRef::Free(_)) => c.knots(),
-            (Self::Surface(s), CurveRef::Border(_, Side::VMin | Side::VMax) | CurveRef::Iso(_, Direction::V, _)) => {
-                &s.knots()[0]
+            (Self::Face { face, .. }, CurveRef::Edge(_, ring, edge)) => match face.edge(*ring as usize, *edge as usize)
+            {
+                Some(edge) => edge.curve.knots(),
+                None => return Vec::new(),
+            },
+            (Self::Surface(_) | Self::Face { .. }, CurveRef::Border(..) | CurveRef::Iso(..)) => {
+                let Some(surface) = self.surface() else { return Vec::new() };
+                match curve {
+                    CurveRef::Border(_, Side::VMin | Side::VMax) | CurveRef::Iso(_, Direction::V, _) => {
+                        &surface.knots()[0]
+                    }
+                    _ => &surface.knots()[1],
+                }
             }
-            (Self::Surface(s), CurveRef::Border(..) | CurveRef::Iso(..)) => &s.knots()[1],
             _ => match self.facet_curve(curve) {
                 Some(chain) => chain.curve.knots(),
                 None => return Vec::new(),
@@ -165,12 +215,18 @@ impl Geometry {
                 let [p, d, dd, _] = self.facet_curve(curve)?.curve.derivatives(t, 2);
                 Some([p, d, dd])
             }
-            Self::Surface(surface) => {
-                let jet = surface.jet(self.curve_uv(curve, t)?, 2);
+            Self::Surface(_) | Self::Face { .. } => {
+                if let (Self::Face { face, .. }, CurveRef::Edge(_, ring, edge)) = (self, curve) {
+                    let [p, d, dd, _] = face.edge(*ring as usize, *edge as usize)?.curve.derivatives(t, 2);
+                    return Some([p, d, dd]);
+                }
+                let jet = self.surface()?.jet(self.curve_uv(curve, t)?, 2);
                 let along_u = match curve {
                     CurveRef::Border(_, side) => matches!(side, Side::VMin | Side::VMax),
                     CurveRef::Iso(_, fixed, _) => *fixed == Direction::V,
-                    CurveRef::Free(_) | CurveRef::Chain(..) | CurveRef::GridLine(..) => return None,
+                    CurveRef::Edge(..) | CurveRef::Free(_) | CurveRef::Chain(..) | CurveRef::GridLine(..) => {
+                        return None;
+                    }
                 };
                 Some(if along_u { [jet.p(), jet.u(), jet.d[2][0]] } else { [jet.p(), jet.v(), jet.d[0][2]] })
             }
@@ -241,8 +297,13 @@ impl Display {
                 let capped = mesh.capped;
                 (Arc::new(mesh), curves, capped)
             }
+            Geometry::Face { face, whole } => {
+                let (mesh, curves) = face_display(id, face, *whole, chord_tol);
+                let capped = mesh.capped;
+                (Arc::new(mesh), curves, capped)
+            }
             Geometry::Curve(curve) => {
-                let (t, capped) = curve_parameters(curve, chord_tol);
+                let (t, capped) = curve_parameters(curve, chord_tol, MAX_SEGMENTS);
                 let points = t.iter().map(|&t| curve.eval(t)).collect();
                 (Arc::default(), vec![DisplayCurve { curve: CurveRef::Free(id), points, t }], capped)
             }
@@ -300,15 +361,7 @@ fn surface_display(id: EntityId, surface: &Surface, chord_tol: f64) -> (SurfaceM
     let (mut lines, capped) = grid_lines(surface, &options);
     let iso = [0, 1].map(|k| iso_parameters(&surface.knots()[k]));
     for (line, iso) in lines.iter_mut().zip(&iso) {
-        let width = line[line.len() - 1] - line[0];
-        for &t in iso {
-            // A grid line that is as good as there is moved: two lines a hair apart would make slivers.
-            match line.iter().position(|x| (x - t).abs() < 1e-9 * width) {
-                Some(at) => line[at] = t,
-                None => line.push(t),
-            }
-        }
-        line.sort_by(f64::total_cmp);
+        add_lines(line, iso);
     }
     let mesh = tessellate_on(surface, lines, capped);
     let (nu, nv) = (mesh.lines[0].len(), mesh.lines[1].len());
@@ -370,33 +423,56 @@ fn facet_curves(id: EntityId, facets: &Facets) -> Vec<DisplayCurve> {
     out
 }
 
-/// Parameters along a curve whose polyline keeps the chord tolerance, and whether the cap cut them short.
-fn curve_parameters(curve: &Curve, chord_tol: f64) -> (Vec<f64>, bool) {
-    let breaks = curve.knots().breaks();
-    let straight = curve.knots().degree() == 1;
-    let tol = chord_tol.max(f64::MIN_POSITIVE);
-    let parts: Vec<f64> = breaks
-        .windows(2)
-        .map(|pair| {
-            // A polynomial piece of degree 1 is straight; a rational one is as well, only unevenly run.
-            if straight {
-                return 1.0;
+fn face_display(id: EntityId, face: &Face, whole: bool, chord_tol: f64) -> (SurfaceMesh, Vec<DisplayCurve>) {
+    let options = TessellateOptions { max_parts: MAX_PARTS, ..TessellateOptions::new(chord_tol) };
+    let iso = [0, 1].map(|k| iso_parameters(&face.surface().knots()[k]));
+    let made = tessellate_face(face, &options, &iso);
+    let mut curves = Vec::new();
+    for (r, (ring, lines)) in face.rings().iter().zip(made.edges).enumerate() {
+        for (e, (edge, line)) in ring.edges.iter().zip(lines).enumerate() {
+            // A cut is no edge of the model, and of a seam that the loop runs twice one line is enough.
+            let again = ring.edges[..e].iter().any(|other| other.id == edge.id);
+            if edge.role == EdgeRole::Model && !again {
+                let curve = CurveRef::Edge(id, r as u32, e as u32);
+                curves.push(DisplayCurve { curve, points: line.points, t: line.t });
             }
-            let h = pair[1] - pair[0];
-            let bend =
-                (0..=8).map(|i| curve.derivatives(pair[0] + h * f64::from(i) / 8.0, 2)[2].length()).fold(0.0, f64::max);
-            (1.2 * bend * h * h / (8.0 * tol)).sqrt().ceil().max(2.0)
-        })
-        .collect();
-    let total: f64 = parts.iter().sum();
-    let scale = (MAX_SEGMENTS as f64 / total).min(1.0);
-    let mut out = vec![breaks[0]];
-    for (pair, n) in breaks.windows(2).zip(&parts) {
-        let n = (n * scale).floor().max(1.0) as usize;
-        out.extend((1..n).map(|i| pair[0] + (pair[1] - pair[0]) * i as f64 / n as f64));
-        out.push(pair[1]);
+        }
     }
-    (out, scale < 1.0)
+    if whole {
+        let (mesh, borders) = surface_display(id, face.surface(), chord_tol);
+        curves.extend(borders);
+        return (mesh, curves);
+    }
+    for (k, (iso, fixed)) in iso.iter().zip([Direction::U, Direction::V]).enumerate() {
+        for &c in iso {
+            let curve = CurveRef::Iso(id, fixed, c);
+            curves.extend(iso_line(face, k, c, &made.mesh.lines[1 - k]).into_iter().map(|t| {
+                DisplayCurve {
+                    curve,
+                    points: t
+                        .iter()
+                        .map(|&t| face.surface().eval(if k == 0 { DVec2::new(c, t) } else { DVec2::new(t, c) }))
+                        .collect(),
+                    t,
+                }
+            }));
+        }
+    }
+    curves.retain(|c| c.points.iter().any(|p| *p != c.points[0]));
+    (made.mesh, curves)
+}
+
+/// The stretches of an iso-line inside a face, at the grid lines and at its loops.
+fn iso_line(face: &Face, k: usize, c: f64, lines: &[f64]) -> Vec<Vec<f64>> {
+    face.stretches(k, c)
+        .into_iter()
+        .map(|[from, to]| {
+            let mut t = vec![from];
+            t.extend(lines.iter().copied().filter(|&x| from < x && x < to));
+            t.push(to);
+            t
+        })
+        .collect()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Which stretches of which curves offer themselves as sides of a patch, and what they mean.
 //!
-//! Every border of every surface is sampled; at each place it is free (no other surface within the joining tolerance),
+//! Every border of every surface and every edge of every face is sampled; at each place it is free (no other surface within the joining tolerance),
 //! shared with one (exactly, or with a gap that is open but within the tolerance), or non-manifold (two or more). Where
 //! the kind changes between two samples, the place is found by bisection, so a border that is half covered by a
 //! neighbour gives a shared and a free stretch. A shared stretch whose normals turn by more than the feature angle is
@@ -18,6 +18,7 @@ use rayon::prelude::*;
 
 use super::colormap::Rgb;
 use super::display::{CurveRef, Geometry};
+use crate::kernel::geom::trim::{EdgeRole, Sheet};
 use crate::kernel::geom::{Aabb, Direction, Side, Surface};
 use crate::kernel::job::Job;
 use crate::kernel::mesh::facets::{FacetCurveKind, Facets};
@@ -149,6 +150,7 @@ impl Edges {
 
 struct Part {
     id: EntityId,
+    sheet: Sheet,
     surface: Arc<Surface>,
     bounds: Aabb,
     set: SurfaceSet,
@@ -165,23 +167,23 @@ struct Near {
 /// Finds the edges of the original surfaces and free curves of a document.
 pub fn feature_edges(document: &Document, options: &EdgeOptions, job: &Job) -> Edges {
     job.phase("Finding edges");
-    let surfaces: Vec<(EntityId, Arc<Surface>)> = document.surfaces().map(|(id, s)| (id, Arc::clone(s))).collect();
+    let sheets: Vec<(EntityId, Sheet)> = document.sheets().collect();
     // Closest points are exact whatever the triangles; these only have to find the right place.
-    let part = |(id, surface): &(EntityId, Arc<Surface>)| {
-        let bounds = surface.bounds();
+    let part = |(id, sheet): &(EntityId, Sheet)| {
+        let bounds = sheet.bounds();
         let chord = (2e-3 * bounds.diagonal()).max(f64::MIN_POSITIVE);
-        let set = SurfaceSet::new(vec![(0, Arc::clone(surface))], chord, job);
-        Part { id: *id, surface: Arc::clone(surface), bounds, set }
+        let set = SurfaceSet::new(vec![(0, sheet.clone())], chord, job);
+        Part { id: *id, sheet: sheet.clone(), surface: Arc::clone(sheet.surface()), bounds, set }
     };
-    let parts: Vec<Part> = surfaces.par_iter().map(part).collect();
+    let parts: Vec<Part> = sheets.par_iter().map(part).collect();
     let done = std::sync::atomic::AtomicUsize::new(0);
     let found: Vec<Vec<EdgePiece>> = (0..parts.len())
         .into_par_iter()
         .map(|k| {
             let mut out = Vec::new();
-            for side in Side::ALL {
+            for curve in borders_of(&parts[k]) {
                 if !job.is_cancelled() {
-                    border(&parts, k, side, options, &mut out);
+                    border(&parts, k, curve, options, &mut out);
                 }
             }
             creases(&parts[k], options, &mut out);
@@ -212,10 +214,27 @@ fn kind_of(near: &Near, options: &EdgeOptions) -> EdgeKind {
     }
 }
 
-fn border(parts: &[Part], k: usize, side: Side, options: &EdgeOptions, out: &mut Vec<EdgePiece>) {
+/// The borders of a whole surface; the edges of a face, a seam once.
+fn borders_of(part: &Part) -> Vec<CurveRef> {
+    let Some(face) = part.sheet.face() else { return Side::ALL.map(|side| CurveRef::Border(part.id, side)).into() };
+    let mut out = Vec::new();
+    for (r, ring) in face.rings().iter().enumerate() {
+        for (e, edge) in ring.edges.iter().enumerate() {
+            let again = ring.edges[..e].iter().any(|other| other.id == edge.id);
+            if edge.role == EdgeRole::Model && !again {
+                out.push(CurveRef::Edge(part.id, r as u32, e as u32));
+            }
+        }
+    }
+    out
+}
+
+fn border(parts: &[Part], k: usize, curve: CurveRef, options: &EdgeOptions, out: &mut Vec<EdgePiece>) {
     let own = &parts[k];
-    let curve = CurveRef::Border(own.id, side);
-    let geometry = Geometry::Surface(Arc::clone(&own.surface));
+    let geometry = match &own.sheet {
+        Sheet::Whole(surface) => Geometry::Surface(Arc::clone(surface)),
+        Sheet::Trimmed(face) => Geometry::Face { face: Arc::clone(face), whole: false },
+    };
     let Some([start, end]) = geometry.curve_domain(&curve) else { return };
     let mut breaks = vec![start];
     breaks.extend(geometry.curve_knots(&curve));
@@ -228,7 +247,7 @@ fn border(parts: &[Part], k: usize, side: Side, options: &EdgeOptions, out: &mut
         places.extend((0..per_span).map(|i| pair[0] + step * (i as f64 + 0.5)));
     }
     let uv = |t: f64| geometry.curve_uv(&curve, t).unwrap_or(DVec2::ZERO);
-    let points: Vec<DVec3> = places.iter().map(|&t| own.surface.eval(uv(t))).collect();
+    let points: Vec<DVec3> = places.iter().map(|&t| own.surface.eval(own.surface.clamped(uv(t)))).collect();
     let size = Aabb::of(points.iter().copied());
     // A border that is shorter than what is joined is a pole.
     if size.diagonal() <= options.joining_tol.min(1e-6 * own.bounds.diagonal()) {
@@ -237,7 +256,7 @@ fn border(parts: &[Part], k: usize, side: Side, options: &EdgeOptions, out: &mut
     let reach = size.grown(options.joining_tol + 0.5 * size.diagonal());
     let others: Vec<&Part> = parts.iter().filter(|p| p.id != own.id && p.bounds.overlaps(&reach)).collect();
     let mut scratch = Scratch::default();
-    let mut look = |t: f64| near(own, side, &others, uv(t), options, &mut scratch);
+    let mut look = |t: f64| near(own, &curve, &others, uv(t), options, &mut scratch);
     let mut seen: Vec<Near> = places.iter().map(|&t| look(t)).collect();
     let same = |a: &Near, b: &Near| a.neighbours == b.neighbours && kind_of(a, options) == kind_of(b, options);
     for i in 1..seen.len().saturating_sub(1) {
@@ -276,7 +295,14 @@ fn border(parts: &[Part], k: usize, side: Side, options: &EdgeOptions, out: &mut
 }
 
 /// The surfaces near a place of a border. `uv` is the place on the surface itself.
-fn near(own: &Part, side: Side, others: &[&Part], uv: DVec2, options: &EdgeOptions, scratch: &mut Scratch) -> Near {
+fn near(
+    own: &Part,
+    curve: &CurveRef,
+    others: &[&Part],
+    uv: DVec2,
+    options: &EdgeOptions,
+    scratch: &mut Scratch,
+) -> Near {
     let jet = own.surface.jet(uv, 1);
     let (p, normal) = (jet.p(), jet.normal());
     let mut out = Near::default();
@@ -289,15 +315,24 @@ fn near(own: &Part, side: Side, others: &[&Part], uv: DVec2, options: &EdgeOptio
     };
     // The seam of a closed surface: the same parameter on the opposite border.
     let [u, v] = own.surface.domain();
-    let opposite = match side {
-        Side::VMin => DVec2::new(uv.x, v[1]),
-        Side::VMax => DVec2::new(uv.x, v[0]),
-        Side::UMin => DVec2::new(u[1], uv.y),
-        Side::UMax => DVec2::new(u[0], uv.y),
+    let opposite = match curve {
+        CurveRef::Border(_, Side::VMin) => Some(DVec2::new(uv.x, v[1])),
+        CurveRef::Border(_, Side::VMax) => Some(DVec2::new(uv.x, v[0])),
+        CurveRef::Border(_, Side::UMin) => Some(DVec2::new(u[1], uv.y)),
+        CurveRef::Border(_, Side::UMax) => Some(DVec2::new(u[0], uv.y)),
+        // A face runs its seam twice.
+        CurveRef::Edge(_, ring, edge) => own.sheet.face().and_then(|face| {
+            let ring = face.rings().get(*ring as usize)?;
+            let id = ring.edges.get(*edge as usize)?.id;
+            (ring.edges.iter().filter(|e| e.id == id).count() > 1).then_some(uv)
+        }),
+        _ => None,
     };
-    let across = own.surface.jet(opposite, 1);
-    if across.p().distance(p) <= options.joining_tol {
-        meet(own.id, across.p().distance(p), across.normal());
+    if let Some(opposite) = opposite {
+        let across = own.surface.jet(opposite, 1);
+        if across.p().distance(p) <= options.joining_tol {
+            meet(own.id, across.p().distance(p), across.normal());
+        }
     }
     for part in others {
         if part.bounds.distance_squared(p) > options.joining_tol * options.joining_tol {
@@ -326,6 +361,7 @@ fn chains(id: EntityId, facets: &Facets, out: &mut Vec<EdgePiece>) {
 
 /// Knots of full multiplicity at which the normal turns by more than the feature angle.
 fn creases(part: &Part, options: &EdgeOptions, out: &mut Vec<EdgePiece>) {
+    // The seam that a face was moved to is such a knot without being a crease; normals tell.
     for (k, fixed) in [Direction::U, Direction::V].into_iter().enumerate() {
         let knots = &part.surface.knots()[k];
         let [start, end] = knots.domain();
@@ -347,14 +383,15 @@ fn creases(part: &Part, options: &EdgeOptions, out: &mut Vec<EdgePiece>) {
             });
             let turn = turns.fold(0.0, f64::max);
             if turn > options.feature_angle {
-                out.push(EdgePiece {
+                let stretches = part.sheet.face().map_or_else(|| vec![along], |face| face.stretches(k, t));
+                out.extend(stretches.into_iter().map(|range| EdgePiece {
                     curve: CurveRef::Iso(part.id, fixed, t),
-                    range: along,
+                    range,
                     kind: EdgeKind::Feature,
                     neighbours: vec![part.id],
                     max_gap: 0.0,
                     max_angle: turn,
-                });
+                }));
             }
         }
     }

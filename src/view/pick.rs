@@ -35,7 +35,7 @@ pub struct Filter {
     pub points: bool,
     /// Free curves.
     pub free_curves: bool,
-    /// Borders of surfaces, patches, meshes and blocks, and feature edges of meshes.
+    /// Borders of surfaces, patches, meshes and blocks, edges of faces, and feature edges of meshes.
     pub borders: bool,
     /// Iso-lines and grid lines, where they are drawn.
     pub iso_lines: bool,
@@ -86,7 +86,7 @@ impl Filter {
     fn curve(&self, curve: &CurveRef) -> bool {
         match curve {
             CurveRef::Free(_) => self.free_curves,
-            CurveRef::Border(..) | CurveRef::Chain(..) => self.borders,
+            CurveRef::Border(..) | CurveRef::Edge(..) | CurveRef::Chain(..) => self.borders,
             CurveRef::Iso(..) | CurveRef::GridLine(..) => self.iso_lines,
         }
     }
@@ -459,13 +459,13 @@ fn surface_hit(item: &Item, ray: &Ray, view: &View, triangle: u32, barycentric: 
     let corners = mesh.triangles.get(triangle as usize)?.map(|k| k as usize);
     let weights = barycentric.to_array();
     let flat = corners.iter().zip(weights).map(|(&k, w)| mesh.points[k] * w).sum();
-    let (uv, point) = match &item.geometry {
-        Geometry::Surface(surface) => {
+    let (uv, point) = match (&item.geometry, item.geometry.surface()) {
+        (_, Some(surface)) => {
             let uv = corners.iter().zip(weights).map(|(&k, w)| mesh.uv[k] * w).sum();
             on_surface(surface, ray, view, uv, flat)
         }
-        Geometry::Facets(_) => (DVec2::new(f64::from(triangle), 0.0), flat),
-        Geometry::Curve(_) => return None,
+        (Geometry::Facets(_), None) => (DVec2::new(f64::from(triangle), 0.0), flat),
+        _ => return None,
     };
     let target = Target::Surface { entity: item.id(), uv };
     Some(PickHit { target, point, distance: 0.0, depth: view.depth(point), hidden: false })

@@ -27,7 +27,7 @@ const VERTICES: usize = 1000;
 /// What an item is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ItemKind {
-    /// A surface of the model.
+    /// A surface or trimmed face of the model.
     Surface,
     /// A healed patch.
     Patch,
@@ -107,14 +107,32 @@ impl Request {
 pub struct Scene {
     items: Vec<Item>,
     revisions: u64,
+    /// Whether faces show as the whole surfaces under them.
+    whole_surfaces: bool,
+    /// Whether that has changed since the last [`Scene::sync`].
+    stale: bool,
 }
 
 impl Scene {
+    /// Whether faces show as the whole surfaces under them.
+    pub fn shows_whole_surfaces(&self) -> bool {
+        self.whole_surfaces
+    }
+
+    /// Shows the whole surfaces under faces, or the faces; the next [`Scene::sync`] follows.
+    pub fn show_whole_surfaces(&mut self, whole: bool) {
+        if self.whole_surfaces != whole {
+            self.whole_surfaces = whole;
+            self.stale = true;
+        }
+    }
+
     /// Follows the document. Returns whether anything changed.
     pub fn sync(&mut self, document: &Document) -> bool {
+        let stale = std::mem::take(&mut self.stale);
         let same = self.items.len() == document.entities().len()
             && self.items.iter().zip(document.entities()).all(|(item, e)| Arc::ptr_eq(&item.entity, e));
-        if same {
+        if same && !stale {
             return false;
         }
         let mut old: std::collections::HashMap<EntityId, Item> = self.items.drain(..).map(|i| (i.id(), i)).collect();
@@ -126,6 +144,10 @@ impl Scene {
             };
             let (kind, number, geometry) = match &entity.shape {
                 Shape::Surface(s) => (ItemKind::Surface, counted(0), Geometry::Surface(Arc::clone(s))),
+                Shape::Face(f) => {
+                    let geometry = Geometry::Face { face: Arc::clone(f), whole: self.whole_surfaces };
+                    (ItemKind::Surface, counted(0), geometry)
+                }
                 Shape::Patch(p) => (ItemKind::Patch, None, Geometry::Surface(Arc::clone(&p.surface))),
                 Shape::Curve(c) => (ItemKind::Curve, counted(1), Geometry::Curve(Arc::clone(c))),
                 Shape::Mesh(f) | Shape::Block(f) => (ItemKind::Mesh, counted(2), Geometry::Facets(Arc::clone(f))),

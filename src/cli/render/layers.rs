@@ -25,6 +25,8 @@ pub enum Show {
     Wireframe,
     /// Translucent surfaces
     Xray,
+    /// The whole surfaces under trimmed faces
+    Untrimmed,
     /// Zebra stripes
     Zebra,
     /// Every surface in a colour of its own

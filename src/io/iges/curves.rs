@@ -5,7 +5,8 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::params::Params;
-use crate::kernel::geom::{Curve, Knots, sweep};
+use crate::kernel::geom::chain::concatenated;
+use crate::kernel::geom::{Curve, sweep};
 
 /// What ends of members may be apart and still be joined, as a fraction of the composite's size; the resolution
 /// that the file claims counts as well, up to [`LOOSEST`].
@@ -108,41 +109,6 @@ pub(super) fn join(members: Vec<Curve>, resolution: f64, notes: &mut Vec<String>
         }
     }
     joined
-}
-
-/// The curve that runs through all curves of a chain one after the other.
-fn concatenated(chain: &[Curve]) -> Result<Curve, String> {
-    let [single] = chain else {
-        let degree = chain.iter().map(|c| c.knots().degree()).max().unwrap_or(1);
-        let rational = chain.iter().any(|c| c.weights().is_some());
-        let (mut knots, mut points, mut weights) = (Vec::new(), Vec::<DVec3>::new(), Vec::<f64>::new());
-        for curve in chain {
-            let [start, end] = curve.domain();
-            let mut curve = curve.restricted(start, end).map_err(|e| e.to_string())?;
-            while curve.knots().degree() < degree {
-                curve = curve.elevated().map_err(|e| e.to_string())?;
-            }
-            let own = curve.weights().map_or_else(|| vec![1.0; curve.points().len()], <[f64]>::to_vec);
-            let values = curve.knots().values();
-            match (knots.last().copied(), weights.last().copied()) {
-                (Some(last), Some(weight)) => {
-                    let (shift, factor): (f64, f64) = (last - start, weight / own[0]);
-                    knots.pop();
-                    knots.extend(values[degree + 1..].iter().map(|v| v + shift));
-                    points.extend_from_slice(&curve.points()[1..]);
-                    weights.extend(own[1..].iter().map(|w| w * factor));
-                }
-                _ => {
-                    knots.extend_from_slice(values);
-                    points.extend_from_slice(curve.points());
-                    weights.extend(own);
-                }
-            }
-        }
-        let knots = Knots::new(degree, knots).map_err(|e| e.to_string())?;
-        return Curve::new(knots, points, rational.then_some(weights)).map_err(|e| e.to_string());
-    };
-    Ok(single.clone())
 }
 
 #[cfg(test)]

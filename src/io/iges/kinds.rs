@@ -61,13 +61,14 @@ pub(super) fn name(kind: i64) -> &'static str {
 pub(super) fn unread(kind: i64, consumed: bool) -> (Severity, String) {
     let name = name(kind);
     match kind {
-        141 | 142 | 502 | 504 | 508 => (Severity::Info, format!("{name}: trimming, left out with that of its face")),
-        186 | 514 => (Severity::Info, format!("{name}: its faces are opened without their connections")),
+        141 | 142 | 502 | 504 | 508 => (Severity::Info, format!("{name}: only describes faces")),
+        186 | 514 => (Severity::Info, format!("{name}: its faces are opened, the group is not kept")),
+        308 | 408 => (Severity::Info, format!("{name}: its members are opened where it stands")),
+        116 | 123 => (Severity::Info, format!("{name}: no curve or surface, left out")),
+        108 => (Severity::Info, format!("{name}: unbounded, and no face uses it")),
         402 => (Severity::Info, format!("{name}: its members are opened, the group is not kept")),
         404 | 406 | 410 | 422 => (Severity::Info, format!("{name}: no geometry, left out")),
-        116 | 123 | 132 | 104 | 108 | 130 if consumed => {
-            (Severity::Info, format!("{name}: only describes another entity"))
-        }
+        132 | 130 if consumed => (Severity::Info, format!("{name}: only describes another entity")),
         202..=230 => (Severity::Info, format!("{name}: no geometry of the model, left out")),
         _ => (Severity::Skipped, format!("{name}: this type is not read")),
     }
@@ -86,29 +87,4 @@ pub(super) fn standard_color(number: i64) -> Option<[f32; 3]> {
         8 => [1.0, 1.0, 1.0],
         _ => return None,
     })
-}
-
-/// The linear value of a display percentage (sRGB).
-pub(super) fn linear_of_percent(percent: f64) -> f32 {
-    let s = (percent / 100.0).clamp(0.0, 1.0);
-    (if s <= 0.04045 { s / 12.92 } else { ((s + 0.055) / 1.055).powf(2.4) }) as f32
-}
-
-/// The display percentage (sRGB) of a linear value; [`linear_of_percent`] gives the same `f32` back.
-pub(super) fn percent_of_linear(linear: f32) -> f64 {
-    let l = f64::from(linear).clamp(0.0, 1.0);
-    100.0 * (if l <= 0.003_130_8 { 12.92 * l } else { 1.055 * l.powf(1.0 / 2.4) - 0.055 })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn colours_survive_the_way_out_and_back() {
-        for i in 0..=1000u16 {
-            let value = f32::from(i) / 1000.0;
-            assert_eq!(linear_of_percent(percent_of_linear(value)), value);
-        }
-    }
 }

@@ -1,13 +1,17 @@
-//! IGES 5.3, fixed 80-column ASCII: surfaces 128, 114, 120 and 122, curves 126, 112, 110, 100 and 102 with transforms 124,
-//! units, colours 314 and names 406. Trimmed faces (144, 143, 510) open as their whole surfaces.
+//! IGES 5.3, fixed 80-column ASCII: surfaces 128, 114, 118, 120, 122, 140, planes and quadrics 108 and 190 to 198; trimmed
+//! faces 144, 143 and 510; curves 126, 112, 110, 106, 104, 102 and 100; with transforms 124, subfigures 308 and 408, units,
+//! colours 314 and names 406.
 //!
 //! Nothing in a file is trusted: counts are checked against the bytes that are there, pointers may lead nowhere
 //! or in circles, and whatever is wrong with one entity loses that entity only. Every entity either becomes
 //! geometry, describes some (transform, colour, name), or has a line in the report. Cost: linear in the file.
 
+mod analytic;
 mod curves;
 mod directory;
+mod faces;
 mod header;
+mod instances;
 mod kinds;
 mod params;
 mod power_basis;
@@ -20,10 +24,12 @@ mod write;
 
 pub use write::{IgesOptions, IgesWriteError, write, write_with_traces};
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
+
+use self::instances::Instances;
 
 use self::directory::Directory;
 use self::header::Header;
@@ -96,6 +102,15 @@ pub fn read(bytes: &[u8]) -> Result<Opened, IgesError> {
         entities: Vec::new(),
         counts: [0; 2],
         unfolding_left,
+        instance: None,
+        reach: Vec::new(),
+        faces: Vec::new(),
+        face_surfaces: HashMap::new(),
+        read_surfaces: HashSet::new(),
+        edges: HashMap::new(),
+        edge_lists: HashMap::new(),
+        vertex_lists: HashMap::new(),
+        next_edge: 0,
     };
     Ok(reader.run())
 }
@@ -115,6 +130,19 @@ struct Reader<'a> {
     /// Surfaces and curves so far.
     counts: [usize; 2],
     unfolding_left: usize,
+    /// The subfigure whose members are being opened: its number and place.
+    instance: Option<(usize, DAffine3)>,
+    /// Points that the next unbounded surface must reach, in the coordinates of its record.
+    reach: Vec<DVec3>,
+    /// Faces to be made at the end.
+    faces: Vec<faces::Job>,
+    /// Surfaces of faces by entry, transform of the face and subfigure.
+    face_surfaces: HashMap<(usize, usize, usize), faces::FaceSurfaces>,
+    read_surfaces: HashSet<usize>,
+    edges: faces::Edges,
+    edge_lists: HashMap<usize, Arc<Vec<[usize; 5]>>>,
+    vertex_lists: HashMap<usize, Arc<Vec<DVec3>>>,
+    next_edge: u64,
 }
 
 /// What a record describes.
@@ -126,22 +154,43 @@ enum Geometry {
 impl Reader<'_> {
     fn run(mut self) -> Opened {
         let uses = Uses::of(&mut self);
+        let instances = Instances::of(&mut self);
         for at in 0..self.directory.entries.len() {
-            match self.directory.entries[at].kind {
-                128 | 114 | 120 | 122 => self.surface(at, &uses),
-                126 | 112 | 110 | 100 | 102 => self.free_curve(at, &uses),
-                144 | 143 | 510 => self.face(at, &uses),
-                124 | 314 | 0 => {}
-                406 if self.directory.entries[at].form == 15 => {}
-                kind => {
-                    let (severity, reason) = kinds::unread(kind, uses.is_consumed(at));
-                    self.note(severity, at, reason);
+            match instances.places(at) {
+                None => self.entity(at, &uses),
+                Some([]) => self.note(Severity::Skipped, at, "it belongs to a subfigure that stands nowhere"),
+                Some(places) => {
+                    for (k, &place) in places.iter().enumerate() {
+                        self.instance = Some((k + 1, place));
+                        self.entity(at, &uses);
+                    }
+                    self.instance = None;
                 }
             }
         }
+        self.make_faces();
+        self.report.lines.sort_by_key(|l| l.line);
         self.show_all_if_all_are_hidden();
         [self.report.surfaces, self.report.curves] = self.counts;
         Opened { document: Document::from_parts(self.header.unit, self.entities, 0), report: self.report }
+    }
+
+    /// Opens what an entry describes, or says why not.
+    fn entity(&mut self, at: usize, uses: &Uses) {
+        let entry = &self.directory.entries[at];
+        match entry.kind {
+            128 | 114 | 118 | 120 | 122 | 140 | 190..=198 => self.surface(at, uses),
+            108 if !uses.faces_of(at).is_empty() => self.surface(at, uses),
+            126 | 112 | 110 | 104 | 100 | 102 => self.free_curve(at, uses),
+            106 if matches!(entry.form, 11..=13 | 63) => self.free_curve(at, uses),
+            144 | 143 | 510 => self.face(at, uses),
+            124 | 314 | 0 => {}
+            406 if entry.form == 15 => {}
+            kind => {
+                let (severity, reason) = kinds::unread(kind, uses.is_consumed(at));
+                self.note(severity, at, reason);
+            }
+        }
     }
 
     /// A report line on an entity.
@@ -204,7 +253,7 @@ impl Reader<'_> {
 
     /// What a record describes, in the coordinates of the record, with its properties.
     fn geometry(&mut self, at: usize, depth: usize) -> Result<(Geometry, Vec<usize>), String> {
-        let kind = self.directory.entries[at].kind;
+        let (kind, form) = (self.directory.entries[at].kind, self.directory.entries[at].form);
         let resolution = self.header.resolution;
         let mut notes = Vec::new();
         let read = self.record(at, |reader, params| {
@@ -215,6 +264,11 @@ impl Reader<'_> {
                 114 => Geometry::Surfaces(power_basis::surface(params, resolution, notes)?),
                 120 => Geometry::Surfaces(vec![reader.revolution(params, depth)?]),
                 122 => Geometry::Surfaces(vec![reader.tabulated(params, depth)?]),
+                118 => Geometry::Surfaces(vec![reader.ruled(form, params, depth, notes)?]),
+                140 => Geometry::Surfaces(vec![reader.offset(params, depth, notes)?]),
+                108 | 190 | 192 | 194 | 196 | 198 => Geometry::Surfaces(vec![reader.analytic(kind, form, params)?]),
+                104 => one(analytic::conic(params)?),
+                106 => one(analytic::copious(form, params)?),
                 126 => Geometry::Curves(spline::curve(params, notes)?),
                 112 => Geometry::Curves(power_basis::curve(params, resolution, notes)?),
                 110 => one(curves::line(params)?),
@@ -294,6 +348,9 @@ impl Reader<'_> {
     fn placement(&mut self, at: usize, outer: Option<usize>) -> Option<DAffine3> {
         let scale = 1.0 / self.header.scale;
         let mut map = (scale != 1.0).then(|| DAffine3::from_scale(DVec3::splat(scale)));
+        if let Some((_, place)) = self.instance {
+            map = Some(map.map_or(place, |map| map * place));
+        }
         for owner in outer.into_iter().chain([at]) {
             match self.transform(self.directory.entries[owner].transform) {
                 Ok(None) => {}
@@ -304,42 +361,29 @@ impl Reader<'_> {
         map.filter(|map| *map != DAffine3::IDENTITY)
     }
 
-    /// A surface: once for itself or for all faces that share its place, once more for each other place.
+    /// A surface that is not trimmed. Those of faces are opened with their faces.
     fn surface(&mut self, at: usize, uses: &Uses) {
+        if !uses.faces_of(at).is_empty() {
+            return self.note(Severity::Info, at, "opened with the faces on it");
+        }
+        if uses.is_consumed(at) {
+            return self.note(Severity::Info, at, "only describes another entity; no surface of its own");
+        }
         let (geometry, properties) = match self.geometry(at, 0) {
             Ok((Geometry::Surfaces(surfaces), properties)) => (surfaces, properties),
             Ok(_) => return,
             Err(reason) => return self.note(Severity::Skipped, at, reason),
         };
-        let mut places: Vec<(usize, Option<usize>)> = Vec::new();
-        for &face in uses.faces_of(at) {
-            let transform = self.directory.entries[face].transform;
-            if !places.iter().any(|&(known, _)| known == transform) {
-                places.push((transform, Some(face)));
+        let map = self.placement(at, None);
+        let name = self.name_of(at, &properties);
+        let count = geometry.len();
+        for (part, surface) in geometry.into_iter().enumerate() {
+            let moved = map.map_or_else(|| surface.clone(), |map| surface.transformed(&map));
+            if let Err(reason) = sound(moved.points()) {
+                self.note(Severity::Skipped, at, reason);
+                continue;
             }
-        }
-        if places.is_empty() {
-            places.push((0, None));
-        }
-        let size: usize = geometry.iter().map(|s| 8 * s.points().len()).sum();
-        for (copy, (_, face)) in places.into_iter().enumerate() {
-            if copy > 0
-                && let Err(reason) = self.unfold(size)
-            {
-                return self.note(Severity::Skipped, at, format!("not opened at all of its places: {reason}"));
-            }
-            let map = self.placement(at, face);
-            let name = face.and_then(|face| self.name_of(face, uses.properties_of(face)));
-            let name = name.or_else(|| self.name_of(at, &properties));
-            let count = geometry.len();
-            for (part, surface) in geometry.iter().enumerate() {
-                let moved = map.map_or_else(|| surface.clone(), |map| surface.transformed(&map));
-                if let Err(reason) = sound(moved.points()) {
-                    self.note(Severity::Skipped, at, reason);
-                    continue;
-                }
-                self.add(Shape::Surface(Arc::new(moved)), face.unwrap_or(at), at, name.as_deref(), (part, count));
-            }
+            self.add(Shape::Surface(Arc::new(moved)), at, at, name.as_deref(), (part, count));
         }
     }
 
@@ -349,7 +393,7 @@ impl Reader<'_> {
         if entry.usage == 5 || uses.is_consumed(at) {
             return self.note(Severity::Info, at, "only describes another entity; no free curve");
         }
-        if entry.dependent {
+        if entry.dependent && self.instance.is_none() {
             return self.note(Severity::Skipped, at, "belongs to another entity, which is not read");
         }
         let (curves, properties) = match self.geometry(at, 0) {
@@ -367,20 +411,6 @@ impl Reader<'_> {
                 continue;
             }
             self.add(Shape::Curve(Arc::new(moved)), at, at, name.as_deref(), (part, count));
-        }
-    }
-
-    /// A face: its surface is opened where its own entry stands; here only the trimming is reported.
-    fn face(&mut self, at: usize, uses: &Uses) {
-        match uses.surface_of(at).map(|surface| (surface, self.directory.entries[surface].kind)) {
-            Some((_, 128 | 114 | 120 | 122)) => {
-                self.note(Severity::Info, at, "trimmed face, opened as its whole surface without the trimming");
-            }
-            Some((_, kind)) => {
-                let reason = format!("its surface is of type {kind} ({}), which is not read", kinds::name(kind));
-                self.note(Severity::Skipped, at, reason);
-            }
-            None => self.note(Severity::Skipped, at, "the surface that it trims does not exist"),
         }
     }
 
@@ -437,7 +467,7 @@ impl Reader<'_> {
             });
             percent.ok()?.ok().filter(|p| p.iter().all(|v| v.is_finite()))
         });
-        let color = read.map(|percent| percent.map(kinds::linear_of_percent));
+        let color = read.map(|percent| percent.map(crate::io::color::linear_of_percent));
         if color.is_none() {
             self.note(Severity::Warning, at, format!("its colour (entity {pointer}) cannot be read"));
         }

@@ -33,7 +33,7 @@ impl Reader<'_> {
     }
 
     /// The curve that a pointer names, at its own place.
-    fn one_curve(&mut self, pointer: usize, depth: usize, what: &str) -> Result<Curve, String> {
+    pub(super) fn one_curve(&mut self, pointer: usize, depth: usize, what: &str) -> Result<Curve, String> {
         let mut curves = self.placed_curves(pointer, depth).map_err(|reason| format!("its {what}: {reason}"))?;
         match (curves.pop(), curves.len()) {
             (Some(curve), 0) => Ok(curve),

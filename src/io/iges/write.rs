@@ -11,9 +11,9 @@ use std::time::SystemTime;
 
 use glam::DVec3;
 
-use super::{header, kinds};
+use super::header;
 use crate::io::Saved;
-use crate::kernel::geom::{Curve, Knots, Surface};
+use crate::kernel::geom::{Aabb, Curve, Knots, Surface};
 use crate::model::document::{Document, EntityId, Shape};
 use crate::model::traces::SurfaceTrace;
 
@@ -66,7 +66,7 @@ pub fn write_with_traces(
         let color = entity.color.map_or(0, |color| {
             *colors.entry(color.map(f32::to_bits)).or_insert_with(|| {
                 let mut record = Record::new(314);
-                color.iter().for_each(|&c| record.real(kinds::percent_of_linear(c)));
+                color.iter().for_each(|&c| record.real(crate::io::color::percent_of_linear(c)));
                 writer.add(&record, &Attributes { status: "00000200", ..Attributes::default() })
             })
         });
@@ -85,6 +85,10 @@ pub fn write_with_traces(
             Shape::Patch(patch) => surface_record(&patch.surface),
             Shape::Curve(curve) => curve_record(curve),
             Shape::Mesh(_) | Shape::Block(_) => continue,
+            Shape::Face(face) => {
+                saved.notes.push(format!("`{}`: a trimmed face, written as its whole surface", entity.name));
+                surface_record(face.surface())
+            }
         };
         if let Some(property) = property {
             record.integer(0);
@@ -314,7 +318,9 @@ impl Writer {
 fn global_section(document: &Document, options: &IgesOptions) -> Vec<String> {
     let mut record = Record { kind: 0, width: 72, lines: Vec::new(), line: String::new() };
     let (flag, unit) = header::flag_and_name(document.unit);
-    let bounds = document.bounds();
+    // Of what is written: under a face that is the whole surface.
+    let bounds = (document.entities().iter())
+        .fold(Aabb::EMPTY, |all, e| all.union(&e.surface().map_or_else(|| e.bounds(), |s| s.bounds())));
     let date = date(options.time);
     let name = ascii(&options.file_name);
     record.text(",");

@@ -8,6 +8,8 @@ use super::part21::{Exchange, Instance, Record, Value};
 #[derive(Clone, Copy)]
 pub struct Access<'f, 'a> {
     exchange: &'f Exchange<'a>,
+    /// Radians in the unit of angles.
+    angle: f64,
 }
 
 /// A message for the import report.
@@ -16,7 +18,18 @@ pub type Problem = String;
 impl<'f, 'a> Access<'f, 'a> {
     /// Access to a file.
     pub fn new(exchange: &'f Exchange<'a>) -> Self {
-        Self { exchange }
+        Self { exchange, angle: 1.0 }
+    }
+
+    /// The same with another unit of angles.
+    #[must_use]
+    pub fn with_angle(self, radians: f64) -> Self {
+        Self { angle: radians, ..self }
+    }
+
+    /// Radians in the unit of angles of the representation that is read.
+    pub fn angle(&self) -> f64 {
+        self.angle
     }
 
     /// An instance by number.

@@ -1,13 +1,17 @@
 //! STEP files (ISO 10303, AP203, AP214, AP242): faces, shells, solids and bare geometry as surfaces and curves.
 //!
-//! Trimmed faces open as their untrimmed surfaces for now, and the report says so. Assemblies are placed, units
-//! taken over. Nothing is dropped silently: what the walk from the representations meets becomes geometry or a
+//! Faces are trimmed and share their edges. Assemblies are placed; units, colours and names taken over. Nothing is dropped silently: what the walk from the representations meets becomes geometry or a
 //! line of the report, and geometry that no representation reaches is counted there.
 
 mod access;
+mod assembly;
+mod curves;
+mod faces;
 pub mod part21;
-mod shapes;
 mod structure;
+mod style;
+mod surfaces;
+mod units;
 
 pub use structure::read;
 

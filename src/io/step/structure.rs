@@ -1,20 +1,27 @@
-//! From representations to entities: units, placements, and the walk through shells to surfaces.
+//! From representations to entities: the walk through solids, shells and sets to faces, surfaces and curves.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
+use rayon::prelude::*;
 
-use super::access::{self, Access, Problem, optional_reference, reference, references};
+use super::access::{Access, Problem, optional_reference, reference, references};
+use super::assembly::placed_representations;
+use super::curves::{self, Bounds};
+use super::faces::{self, Edges, FaceJob};
 use super::part21::{self, Exchange, Value};
-use super::shapes;
+use super::style::Styles;
+use super::surfaces;
+use super::units::{ContextUnits, units};
 use crate::io::report::{ImportReport, Severity};
-use crate::model::document::{Document, Shape, Unit};
+use crate::kernel::geom::trim::SurfaceKind;
+use crate::model::document::{Document, Entity, EntityId, Shape};
 
 /// How deep assemblies and item lists may be nested.
-const MAX_DEPTH: usize = 64;
+pub const MAX_DEPTH: usize = 64;
 /// How many placed items a file may have, so that a small file cannot ask for endless copies.
-const MAX_ITEMS: usize = 1_000_000;
+pub const MAX_ITEMS: usize = 1_000_000;
 
 /// Reads a file.
 pub fn read(text: &str, report: &mut ImportReport) -> Document {
@@ -33,33 +40,55 @@ pub fn read(text: &str, report: &mut ImportReport) -> Document {
     }
     let file = Access::new(&exchange);
     let (unit, factors) = units(&exchange, file, report);
+    let styles = Styles::of(&exchange, file);
     let mut walk = Walk {
         file,
         exchange: &exchange,
         report,
-        document: Document::new(unit),
+        entities: Vec::new(),
         factors,
+        styles,
         met: HashSet::new(),
-        untrimmed: 0,
+        jobs: Vec::new(),
+        edges: Edges::default(),
         items: 0,
+        places: 0,
     };
     for (representation, place) in placed_representations(&exchange, file) {
-        walk.representation(representation, place, 0);
+        let name = walk.styles.names.get(&representation).cloned().unwrap_or_default();
+        let manner = Manner { name, color: walk.styles.colors.get(&representation).copied(), visible: true };
+        walk.representation(representation, place, &manner, 0);
     }
+    walk.make_faces();
+    walk.report.lines.sort_by_key(|l| l.line);
     walk.rest();
-    walk.document
+    walk.show_all_if_all_are_hidden();
+    Document::from_parts(unit, walk.entities, 0)
 }
 
 struct Walk<'r, 'f, 'a> {
     file: Access<'f, 'a>,
     exchange: &'f Exchange<'a>,
     report: &'r mut ImportReport,
-    document: Document,
-    /// Factor from each representation context to the unit of the document.
-    factors: HashMap<u64, f64>,
+    entities: Vec<Entity>,
+    /// The units of each representation context.
+    factors: HashMap<u64, ContextUnits>,
+    styles: Styles,
     met: HashSet<u64>,
-    untrimmed: usize,
+    /// Faces to be made at the end.
+    jobs: Vec<FaceJob>,
+    edges: Edges,
     items: usize,
+    /// How many placed representations there were: edges are shared inside one only.
+    places: usize,
+}
+
+/// How an item shows if it does not say itself.
+#[derive(Clone, Debug)]
+struct Manner {
+    name: String,
+    color: Option<[f32; 3]>,
+    visible: bool,
 }
 
 impl Walk<'_, '_, '_> {
@@ -71,21 +100,25 @@ impl Walk<'_, '_, '_> {
         self.report.add(Severity::Skipped, kind, Some(number as usize), line, reason);
     }
 
-    fn representation(&mut self, number: u64, place: DAffine3, depth: usize) {
+    fn representation(&mut self, number: u64, place: DAffine3, manner: &Manner, depth: usize) {
         let Some(record) =
             self.exchange.instances.get(&number).and_then(|i| i.records.iter().find(|r| r.values.len() >= 3))
         else {
             return;
         };
-        let factor = optional_reference(record, 2).and_then(|c| self.factors.get(&c)).copied().unwrap_or(1.0);
+        let context = optional_reference(record, 2).and_then(|c| self.factors.get(&c)).copied().unwrap_or_default();
         // Lengths of the context become lengths of the document behind the placement.
-        let place = place * DAffine3::from_scale(DVec3::splat(factor));
+        let place = place * DAffine3::from_scale(DVec3::splat(context.length));
+        let outer = self.file;
+        self.file = outer.with_angle(context.angle);
+        self.places += 1;
         for item in references(record, 1).unwrap_or_default() {
-            self.item(item, &place, "", depth + 1);
+            self.item(item, &place, manner, depth + 1);
         }
+        self.file = outer;
     }
 
-    fn item(&mut self, number: u64, place: &DAffine3, name: &str, depth: usize) {
+    fn item(&mut self, number: u64, place: &DAffine3, outer: &Manner, depth: usize) {
         self.items += 1;
         if depth > MAX_DEPTH || self.items > MAX_ITEMS {
             if depth == MAX_DEPTH + 1 || self.items == MAX_ITEMS + 1 {
@@ -99,10 +132,12 @@ impl Walk<'_, '_, '_> {
         };
         self.met.insert(number);
         let Some(record) = instance.records.first() else { return };
-        let own = match record.values.first() {
-            Some(Value::String(raw)) if !raw.is_empty() => part21::text(raw).into_owned(),
-            _ => name.to_owned(),
+        let name = match record.values.first() {
+            Some(Value::String(raw)) if !matches!(*raw, "" | "NONE") => part21::text(raw).into_owned(),
+            _ => outer.name.clone(),
         };
+        let color = self.styles.colors.get(&number).copied().or(outer.color);
+        let manner = Manner { name, color, visible: outer.visible && !self.styles.hidden.contains(&number) };
         let list_at = match record.name {
             "GEOMETRIC_SET"
             | "GEOMETRIC_CURVE_SET"
@@ -116,35 +151,48 @@ impl Walk<'_, '_, '_> {
             | "FACETED_BREP"
             | "BREP_WITH_VOIDS"
             | "ORIENTED_CLOSED_SHELL"
-            | "ORIENTED_OPEN_SHELL" => Some(()),
+            | "ORIENTED_OPEN_SHELL"
+            | "ORIENTED_FACE"
+            | "SUBFACE"
+            | "SURFACED_OPEN_SHELL" => Some(()),
             _ => None,
         };
         if list_at.is_some() {
             let inner: Vec<u64> = record.values.iter().skip(1).flat_map(all_references).collect();
             for next in inner {
-                self.item(next, place, &own, depth + 1);
+                self.item(next, place, &manner, depth + 1);
             }
             return;
         }
         match record.name {
-            "ADVANCED_FACE" | "FACE_SURFACE" => self.face(number, place, &own),
+            "ADVANCED_FACE" | "FACE_SURFACE" => self.face(number, place, &manner),
+            "CURVE_BOUNDED_SURFACE" => self.bounded(number, place, &manner),
             "MAPPED_ITEM" => match self.mapped(number) {
-                Ok((representation, inner)) => self.representation(representation, *place * inner, depth + 1),
+                Ok((representation, inner)) => {
+                    let name = self.styles.names.get(&representation).cloned();
+                    let manner = Manner { name: name.unwrap_or_else(|| manner.name.clone()), ..manner };
+                    self.representation(representation, *place * inner, &manner, depth + 1);
+                }
                 Err(reason) => self.skip(number, reason),
             },
             n if n.starts_with("AXIS") || n == "CARTESIAN_POINT" || n == "VERTEX_POINT" => {}
-            n if is_surface(instance, n) => match shapes::surface(self.file, number, &[], 0) {
-                Ok(surface) => self.add(number, &own, Shape::Surface(Arc::new(surface.transformed(place)))),
+            n if is_surface(instance, n) => match surfaces::surface(self.file, number, &[], 0) {
+                Ok(surface) => {
+                    self.add(number, &manner, Shape::Surface(Arc::new(surface.transformed(place))));
+                }
                 Err(reason) => self.skip(number, reason),
             },
-            _ => match shapes::curve(self.file, number, None, 0) {
-                Ok(curve) => self.add(number, &own, Shape::Curve(Arc::new(curve.transformed(place)))),
+            _ => match curves::curve(self.file, number, Bounds::Own, 0) {
+                Ok(curve) => {
+                    self.add(number, &manner, Shape::Curve(Arc::new(curve.transformed(place))));
+                }
                 Err(reason) => self.skip(number, reason),
             },
         }
     }
 
-    fn add(&mut self, number: u64, name: &str, shape: Shape) {
+    /// Adds an entity and says at which place of the document.
+    fn add(&mut self, number: u64, manner: &Manner, shape: Shape) -> Option<usize> {
         let finite = match &shape {
             Shape::Surface(s) => s.points().iter().all(|p| p.is_finite()),
             Shape::Curve(c) => c.points().iter().all(|p| p.is_finite()),
@@ -152,76 +200,126 @@ impl Walk<'_, '_, '_> {
         };
         if !finite {
             self.skip(number, "its coordinates overflow when it is placed");
-            return;
+            return None;
         }
         match &shape {
             Shape::Curve(_) => self.report.curves += 1,
             _ => self.report.surfaces += 1,
         }
-        let name = if name.is_empty() { format!("#{number}") } else { name.to_owned() };
-        self.document.add(name, shape, None);
+        let name = if manner.name.is_empty() { format!("#{number}") } else { manner.name.clone() };
+        let id = EntityId(self.entities.len() as u64);
+        self.entities.push(Entity { id, name, shape, visible: manner.visible, color: manner.color });
+        Some(self.entities.len() - 1)
     }
 
-    fn face(&mut self, number: u64, place: &DAffine3, name: &str) {
-        let result = self.file.record(number, &["ADVANCED_FACE", "FACE_SURFACE"]).and_then(|record| {
-            let mut reach = Vec::new();
-            let mut edges = 0;
-            for bound in references(record, 1)? {
-                edges += self.bound(bound, &mut reach)?;
-            }
-            let basis = reference(record, 2)?;
-            Ok((basis, shapes::surface(self.file, basis, &reach, 0)?, edges))
-        });
-        match result {
-            Ok((basis, surface, edges)) => {
-                self.met.insert(basis);
-                self.untrimmed += usize::from(edges > 0);
-                self.add(number, name, Shape::Surface(Arc::new(surface.transformed(place))));
+    /// A face: its loops are read here, and made on all threads at the end.
+    fn face(&mut self, number: u64, place: &DAffine3, manner: &Manner) {
+        let basis = self.file.record(number, &["ADVANCED_FACE", "FACE_SURFACE"]).and_then(|r| reference(r, 2));
+        let basis = match basis {
+            Ok(basis) => basis,
+            Err(reason) => return self.skip(number, reason),
+        };
+        self.met.insert(basis);
+        let rings = faces::loops(self.file, number, (self.places, place), &mut self.edges);
+        let vertices = faces::vertices(self.file, number);
+        self.trimmed(number, basis, rings, vertices, place, manner, true);
+    }
+
+    /// A surface between curves, without a topology.
+    fn bounded(&mut self, number: u64, place: &DAffine3, manner: &Manner) {
+        let record = self.file.record(number, &["CURVE_BOUNDED_SURFACE"]);
+        match record.and_then(|r| reference(r, 1)) {
+            Ok(basis) => {
+                let rings = faces::bounded(self.file, number, place, &mut self.edges);
+                self.trimmed(number, basis, rings, Vec::new(), place, manner, false);
             }
             Err(reason) => self.skip(number, reason),
         }
     }
 
-    /// Gathers points on the edges of a face bound and counts the edges.
-    fn bound(&mut self, number: u64, reach: &mut Vec<DVec3>) -> Result<usize, Problem> {
-        let bound = self.file.record(number, &["FACE_OUTER_BOUND", "FACE_BOUND"])?;
-        let ring = reference(bound, 1)?;
-        let Ok(edge_loop) = self.file.record(ring, &["EDGE_LOOP"]) else { return Ok(0) };
-        let edges = references(edge_loop, 1)?;
-        for &oriented in &edges {
-            let oriented = self.file.record(oriented, &["ORIENTED_EDGE"])?;
-            let edge = self.file.record(reference(oriented, 3)?, &["EDGE_CURVE"])?;
-            let vertex = |at: usize| -> Result<DVec3, Problem> {
-                let vertex = self.file.record(reference(edge, at)?, &["VERTEX_POINT"])?;
-                self.file.point(reference(vertex, 1)?)
-            };
-            let ends = [vertex(1)?, vertex(2)?];
-            let carrier = reference(edge, 3)?;
-            let in_order = if access::is_true(edge, 4) { ends } else { [ends[1], ends[0]] };
-            reach.extend(ends);
-            // An edge that cannot be read still leaves its ends.
-            if let Ok(curve) = shapes::curve(self.file, carrier, Some(in_order), 0) {
-                reach.extend(curve.sampled(4).into_iter().map(|(_, p)| p));
+    #[allow(clippy::too_many_arguments)] // what a face is
+    fn trimmed(
+        &mut self,
+        number: u64,
+        basis: u64,
+        rings: Result<Vec<Vec<crate::kernel::geom::ring::EdgeInput>>, Problem>,
+        vertices: Vec<DVec3>,
+        place: &DAffine3,
+        manner: &Manner,
+        oriented: bool,
+    ) {
+        let back = place.inverse();
+        let mut reach: Vec<DVec3> = rings
+            .as_ref()
+            .map_or_else(|_| Vec::new(), |r| faces::reach(r))
+            .into_iter()
+            .map(|p| back.transform_point3(p))
+            .collect();
+        reach.extend(vertices);
+        let surface = match surfaces::surface(self.file, basis, &reach, 0) {
+            Ok(surface) => Arc::new(surface.transformed(place)),
+            Err(reason) => return self.skip(number, reason),
+        };
+        let kind = self.file.instance(basis).map_or(SurfaceKind::Spline, surfaces::kind);
+        let Some(at) = self.add(number, manner, Shape::Surface(Arc::clone(&surface))) else { return };
+        match rings {
+            Ok(rings) if rings.is_empty() => {}
+            Ok(rings) => self.jobs.push(FaceJob { number, at, surface, kind, rings, oriented }),
+            Err(reason) => self.warn(number, format!("opened as its whole surface: {reason}")),
+        }
+    }
+
+    fn warn(&mut self, number: u64, reason: impl Into<String>) {
+        let instance = self.exchange.instances.get(&number);
+        let (kind, line) = instance.map_or(("STEP".to_owned(), None), |i| (i.type_name(), Some(i.line)));
+        self.report.add(Severity::Warning, kind, Some(number as usize), line, reason);
+    }
+
+    /// Makes the faces that were read, in file order whatever the threads.
+    fn make_faces(&mut self) {
+        let jobs = std::mem::take(&mut self.jobs);
+        let made: Vec<_> = jobs.par_iter().map(FaceJob::run).collect();
+        for (job, made) in jobs.iter().zip(made) {
+            match made {
+                Ok(made) => {
+                    let size = job.surface.bounds().diagonal();
+                    if made.gap > 1e-3 * size {
+                        let reason = format!("its loops are open by up to {:.3e}; they were closed straight", made.gap);
+                        self.warn(job.number, reason);
+                    }
+                    if made.off > 1e-4 * size {
+                        self.warn(job.number, format!("its edges lie up to {:.3e} off its surface", made.off));
+                    }
+                    if let Some(entity) = self.entities.get_mut(job.at) {
+                        entity.shape = Shape::Face(Arc::new(made.face));
+                    }
+                }
+                Err(reason) => self.warn(job.number, format!("opened as its whole surface: {reason}")),
             }
         }
-        Ok(edges.len())
+    }
+
+    /// A file in which everything is marked hidden would open as nothing.
+    fn show_all_if_all_are_hidden(&mut self) {
+        let all = self.entities.len();
+        if all == 0 || self.entities.iter().any(|e| e.visible) {
+            return;
+        }
+        self.entities.iter_mut().for_each(|e| e.visible = true);
+        self.report.add(Severity::Warning, "file", None, None, format!("all {all} entities are hidden; all are shown"));
     }
 
     /// The representation of a MAPPED_ITEM and where it goes.
     fn mapped(&self, number: u64) -> Result<(u64, DAffine3), Problem> {
         let item = self.file.record(number, &["MAPPED_ITEM"])?;
         let map = self.file.record(reference(item, 1)?, &["REPRESENTATION_MAP"])?;
-        let origin = shapes::placement(self.file, reference(map, 0)?)?;
-        let target = shapes::placement(self.file, reference(item, 2)?)?;
+        let origin = curves::placement(self.file, reference(map, 0)?)?;
+        let target = curves::placement(self.file, reference(item, 2)?)?;
         Ok((reference(map, 1)?, target * origin.inverse()))
     }
 
     /// What no representation reached, and what was read other than it stands.
     fn rest(&mut self) {
-        if self.untrimmed > 0 {
-            let reason = format!("{} trimmed faces were opened as their whole surfaces", self.untrimmed);
-            self.report.add(Severity::Info, "ADVANCED_FACE", None, None, reason);
-        }
         let mut left: BTreeMap<String, usize> = BTreeMap::new();
         for number in &self.exchange.order {
             let Some(instance) = self.exchange.instances.get(number) else { continue };
@@ -245,169 +343,10 @@ fn is_surface(instance: &part21::Instance<'_>, name: &str) -> bool {
 }
 
 /// The references of a value, lists included.
-fn all_references(value: &Value<'_>) -> Vec<u64> {
+pub fn all_references(value: &Value<'_>) -> Vec<u64> {
     match value {
         Value::Reference(number) => vec![*number],
         Value::List(values) => values.iter().flat_map(all_references).collect(),
         _ => Vec::new(),
     }
-}
-
-/// The unit of the document (that of the first context with one) and the factor of every context to it.
-fn units(exchange: &Exchange<'_>, file: Access<'_, '_>, report: &mut ImportReport) -> (Unit, HashMap<u64, f64>) {
-    let mut metres: Vec<(u64, f64)> = Vec::new();
-    for &number in &exchange.order {
-        let Some(record) = exchange.instances.get(&number).and_then(|i| i.record("GLOBAL_UNIT_ASSIGNED_CONTEXT"))
-        else {
-            continue;
-        };
-        let unit = references(record, 0).unwrap_or_default().into_iter().find_map(|n| length_in_metres(file, n, 0));
-        match unit {
-            Some(metre) => metres.push((number, metre)),
-            None => report.add(
-                Severity::Warning,
-                "STEP unit",
-                Some(number as usize),
-                None,
-                "no length unit that can be read; lengths are kept as they are",
-            ),
-        }
-    }
-    let Some(&(_, first)) = metres.first() else { return (Unit::Unknown, HashMap::new()) };
-    let known = [
-        (Unit::Millimetre, 1e-3),
-        (Unit::Metre, 1.0),
-        (Unit::Inch, 0.0254),
-        (Unit::Foot, 0.3048),
-        (Unit::Centimetre, 1e-2),
-        (Unit::Kilometre, 1e3),
-        (Unit::Micrometre, 1e-6),
-        (Unit::Mile, 1609.344),
-        (Unit::Mil, 2.54e-5),
-        (Unit::Microinch, 2.54e-8),
-    ];
-    let (unit, size) =
-        known.into_iter().find(|(_, m)| (m / first - 1.0).abs() < 1e-9).unwrap_or((Unit::Millimetre, 1e-3));
-    let factor = |m: f64| if (m / size - 1.0).abs() < 1e-9 { 1.0 } else { m / size };
-    if metres.iter().any(|&(_, m)| factor(m) != 1.0) {
-        let reason =
-            format!("the file uses several units or an uncommon one; all lengths were converted to {}", unit.symbol());
-        report.add(Severity::Info, "STEP unit", None, None, reason);
-    }
-    (unit, metres.into_iter().map(|(context, m)| (context, factor(m))).collect())
-}
-
-/// How many metres a length unit has; `None` for units of other things.
-fn length_in_metres(file: Access<'_, '_>, number: u64, depth: usize) -> Option<f64> {
-    let instance = file.instance(number).ok()?;
-    instance.record("LENGTH_UNIT")?;
-    if let Some(si) = instance.record("SI_UNIT") {
-        let prefix = match si.values.iter().rev().nth(1) {
-            Some(Value::Enum(name)) => match *name {
-                "MILLI" => 1e-3,
-                "CENTI" => 1e-2,
-                "DECI" => 1e-1,
-                "KILO" => 1e3,
-                "MICRO" => 1e-6,
-                "NANO" => 1e-9,
-                _ => return None,
-            },
-            _ => 1.0,
-        };
-        return Some(prefix);
-    }
-    let conversion = instance.record("CONVERSION_BASED_UNIT")?;
-    let measure = file.instance(reference(conversion, 1).ok()?).ok()?;
-    let record = measure.records.iter().find(|r| r.values.len() >= 2)?;
-    let value = access::real(record, 0).ok()?;
-    let base = if depth < 4 { length_in_metres(file, reference(record, 1).ok()?, depth + 1)? } else { return None };
-    Some(value * base).filter(|m| *m > 0.0 && m.is_finite())
-}
-
-/// Every representation of shape with the places where it occurs.
-fn placed_representations(exchange: &Exchange<'_>, file: Access<'_, '_>) -> Vec<(u64, DAffine3)> {
-    let is_shape = |n: &u64| {
-        exchange.instances.get(n).is_some_and(|i| {
-            i.records
-                .iter()
-                .any(|r| r.name.ends_with("SHAPE_REPRESENTATION") && matches!(r.values.get(1), Some(Value::List(_))))
-        })
-    };
-    // Plain relationships make one node of several representations; those with a transformation are placements.
-    let mut same: HashMap<u64, Vec<u64>> = HashMap::new();
-    let mut children: HashMap<u64, Vec<(u64, DAffine3)>> = HashMap::new();
-    let mut placed: HashSet<u64> = HashSet::new();
-    for number in &exchange.order {
-        let Some(instance) = exchange.instances.get(number) else { continue };
-        let named = |n: &str| instance.record(n);
-        let Some(base) = named("REPRESENTATION_RELATIONSHIP")
-            .or_else(|| named("SHAPE_REPRESENTATION_RELATIONSHIP").filter(|r| r.values.len() >= 4))
-        else {
-            continue;
-        };
-        let (Ok(child), Ok(parent)) = (reference(base, 2), reference(base, 3)) else { continue };
-        let operator = named("REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION").and_then(|r| optional_reference(r, 0));
-        match operator.and_then(|n| transformation(file, n).ok()) {
-            Some(place) => {
-                children.entry(parent).or_default().push((child, place));
-                placed.insert(child);
-            }
-            None => {
-                same.entry(child).or_default().push(parent);
-                same.entry(parent).or_default().push(child);
-            }
-        }
-    }
-    let mapped: HashSet<u64> = exchange
-        .instances
-        .values()
-        .filter_map(|i| i.record("REPRESENTATION_MAP").and_then(|r| reference(r, 1).ok()))
-        .collect();
-    let group = |start: u64| {
-        let mut all = vec![start];
-        let mut at = 0;
-        while at < all.len() {
-            for &next in same.get(&all[at]).map_or(&[][..], Vec::as_slice) {
-                if !all.contains(&next) {
-                    all.push(next);
-                }
-            }
-            at += 1;
-        }
-        all
-    };
-    let mut out = Vec::new();
-    let mut done: HashSet<u64> = HashSet::new();
-    for &start in exchange.order.iter().filter(|n| is_shape(n) && !mapped.contains(n)) {
-        if done.contains(&start) {
-            continue;
-        }
-        let members = group(start);
-        done.extend(&members);
-        if members.iter().any(|m| placed.contains(m)) {
-            continue;
-        }
-        let mut stack = vec![(members, DAffine3::IDENTITY, 0)];
-        while let Some((members, place, depth)) = stack.pop() {
-            for &member in &members {
-                if is_shape(&member) {
-                    out.push((member, place));
-                }
-                for (child, inner) in children.get(&member).map_or(&[][..], Vec::as_slice) {
-                    if depth < MAX_DEPTH && out.len() + stack.len() < MAX_ITEMS {
-                        stack.push((group(*child), place * *inner, depth + 1));
-                    }
-                }
-            }
-        }
-    }
-    out
-}
-
-/// ITEM_DEFINED_TRANSFORMATION: from the frame of its first item to that of its second.
-fn transformation(file: Access<'_, '_>, number: u64) -> Result<DAffine3, Problem> {
-    let record = file.record(number, &["ITEM_DEFINED_TRANSFORMATION"])?;
-    let from = shapes::placement(file, reference(record, 2)?)?;
-    let to = shapes::placement(file, reference(record, 3)?)?;
-    Ok(to * from.inverse())
 }

@@ -5,18 +5,24 @@
 //! ([`blossom`]).
 
 mod aabb;
+pub mod analytic;
 pub mod arc_length;
 mod bezier;
 pub mod blossom;
+pub mod chain;
+pub mod chart;
 pub mod closest;
 pub mod closest_curve;
 mod curve;
 mod differential;
 mod knots;
+pub mod pcurve;
 #[cfg(test)]
 mod precise;
+pub mod ring;
 mod surface;
 pub mod sweep;
+pub mod trim;
 
 pub use aabb::Aabb;
 pub use bezier::BezierPatch;

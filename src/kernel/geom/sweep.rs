@@ -74,6 +74,17 @@ pub fn arc(center: DVec3, x: DVec3, y: DVec3, from: f64, to: f64) -> Result<Curv
     Ok(Curve::new(knots, points, Some(net.iter().map(|n| n[2]).collect()))?)
 }
 
+/// The parameter at which an arc from `from` to `to` (see [`arc`]) is at an angle between them.
+pub fn parameter_at_angle(from: f64, to: f64, angle: f64) -> f64 {
+    let Ok(breaks) = pieces(from, to) else { return angle };
+    let k = breaks.partition_point(|&b| b <= angle).clamp(1, breaks.len() - 1);
+    let (start, width) = (breaks[k - 1], breaks[k] - breaks[k - 1]);
+    let turn = (angle - start).clamp(0.0, width);
+    // The ratio of the end weights' Bernstein terms is that of the sines of the half angles to the ends.
+    let (a, b) = ((0.5 * turn).sin(), (0.5 * (width - turn)).sin());
+    start + width * (a / (a + b))
+}
+
 /// The surface `curve(u) + v direction`, v in 0..=1.
 pub fn extruded(curve: &Curve, direction: DVec3) -> Result<Surface, SweepError> {
     if !(direction.is_finite() && direction.length() > 0.0) {
@@ -126,6 +137,18 @@ mod tests {
         }
         let circle = arc(DVec3::ZERO, DVec3::X, DVec3::Y, 0.3, 0.3 + TAU).unwrap();
         assert_eq!(circle.points()[0], circle.points()[8]);
+    }
+
+    #[test]
+    fn parameters_of_angles_lead_to_them() {
+        for (from, to) in [(0.0, TAU), (-1.0, 2.5), (-FRAC_PI_2, FRAC_PI_2)] {
+            let curve = arc(DVec3::ZERO, DVec3::X, DVec3::Y, from, to).unwrap();
+            for k in 0..=40 {
+                let angle = from + (to - from) * f64::from(k) / 40.0;
+                let p = curve.eval(parameter_at_angle(from, to, angle));
+                assert!(p.distance(DVec3::new(angle.cos(), angle.sin(), 0.0)) < 1e-14);
+            }
+        }
     }
 
     #[test]

@@ -9,6 +9,9 @@
 //! Meshes and blocks come as they are: without a parametric description the triangle hit is the condition (HJR99 3.3),
 //! so their triangles are both tree and truth, and a point's parameters are the number of its triangle and 0.
 //!
+//! Of a trimmed face only the trimmed part counts: a segment meets it inside its loops, and a closest point outside of
+//! them gives way to the nearest place of the triangles, which is at the border within the chord tolerance.
+//!
 //! Cost: a few microseconds a query. Cells cut short by the tessellation's cap weaken the guarantee;
 //! [`SurfaceSet::capped`] names them.
 
@@ -18,10 +21,12 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::body::Body;
+use super::face_mesh::tessellate_face;
 use super::tessellate::{SurfaceMesh, TessellateOptions, tessellate};
 use super::tri_tree::{Hit, Nearest, TriTree};
-use crate::kernel::geom::closest::{Closed, closed_directions, closest_from, line_from};
-use crate::kernel::geom::{Aabb, Surface};
+use crate::kernel::geom::Aabb;
+use crate::kernel::geom::closest::{Closed, Foot, closed_directions, closest_from, line_from};
+use crate::kernel::geom::trim::Sheet;
 use crate::kernel::job::Job;
 
 /// What two hits may be apart and still be one, and what a segment may pass by a border and still hit it, as a
@@ -29,6 +34,8 @@ use crate::kernel::job::Job;
 const SAME: f64 = 1e-9;
 /// How far a foot from a guess may be, in chord tolerances, for the search to start from it.
 const GOOD: f64 = 4.0;
+/// How far outside its loops a face is still hit, as a fraction of its chord tolerance: neighbours leave no slit.
+const RIM: f64 = 1e-2;
 /// The most candidates of one query that are polished on the real surfaces.
 const CANDIDATES: usize = 64;
 
@@ -36,7 +43,7 @@ const CANDIDATES: usize = 64;
 #[derive(Clone, Debug)]
 enum Truth {
     /// A surface, and along which parameters it is closed.
-    Surface(Arc<Surface>, Closed),
+    Surface(Sheet, Closed),
     /// The triangles themselves.
     Triangles,
 }
@@ -101,7 +108,14 @@ impl SurfaceSet {
             .par_iter()
             .map(|(_, body)| {
                 (!job.is_cancelled()).then(|| match body {
-                    Body::Surface(s) => (tessellate(s, &options), Truth::Surface(Arc::clone(s), closed_directions(s))),
+                    Body::Surface(s) => {
+                        let sheet = Sheet::Whole(Arc::clone(s));
+                        (tessellate(s, &options), Truth::Surface(sheet, closed_directions(s)))
+                    }
+                    Body::Face(f) => {
+                        let mesh = tessellate_face(f, &options, &[Vec::new(), Vec::new()]).mesh;
+                        (mesh, Truth::Surface(Sheet::Trimmed(Arc::clone(f)), closed_directions(f.surface())))
+                    }
                     Body::Facets(f) => {
                         let (points, triangles) = (f.mesh().points().to_vec(), f.mesh().triangles().to_vec());
                         (SurfaceMesh { points, triangles, ..SurfaceMesh::default() }, Truth::Triangles)
@@ -109,7 +123,7 @@ impl SurfaceSet {
                 })
             })
             .collect();
-        let parametric = bodies.iter().any(|(_, body)| matches!(body, Body::Surface(_)));
+        let parametric = bodies.iter().any(|(_, body)| !matches!(body, Body::Facets(_)));
         let mut set = Self {
             truths: Vec::new(),
             numbers: Vec::new(),
@@ -127,13 +141,10 @@ impl SurfaceSet {
             let Some((mesh, truth)) = mesh else { break };
             let base = points.len() as u32;
             let first = set.triangles.len() as u32;
-            if let Truth::Surface(surface, _) = &truth {
-                let [u, v] = surface.domain();
-                let at_border = |k: u32| {
-                    let uv = mesh.uv[k as usize];
-                    u.contains(&uv.x) || v.contains(&uv.y)
-                };
-                let on_border = mesh.triangles.iter().enumerate().filter(|(_, t)| t.iter().any(|&k| at_border(k)));
+            if let Truth::Surface(sheet, _) = &truth {
+                let is_border = border_vertices(sheet, &mesh);
+                let on_border =
+                    mesh.triangles.iter().enumerate().filter(|(_, t)| t.iter().any(|&k| is_border[k as usize]));
                 set.border.1.extend(on_border.map(|(k, _)| first + k as u32));
             }
             if mesh.capped {
@@ -213,10 +224,10 @@ impl SurfaceSet {
     pub fn closest_near(&self, p: DVec3, guess: (usize, DVec2), scratch: &mut Scratch) -> Option<OnSurface> {
         let index = self.numbers.iter().position(|&n| n == guess.0);
         if let Some(index) = index
-            && let Truth::Surface(surface, closed) = &self.truths[index]
+            && let Truth::Surface(sheet, closed) = &self.truths[index]
         {
-            let foot = closest_from(surface, *closed, p, guess.1);
-            if foot.distance <= GOOD * self.chord_tol {
+            let foot = closest_from(sheet.surface(), *closed, p, guess.1);
+            if foot.distance <= GOOD * self.chord_tol && sheet.reaches(foot.uv, RIM * self.chord_tol) {
                 let start = OnSurface { surface: guess.0, uv: foot.uv, point: foot.point, distance: foot.distance };
                 return Some(self.better(p, (index, start), start.distance, scratch));
             }
@@ -229,8 +240,12 @@ impl SurfaceSet {
         let (index, uv) = self.place(n.triangle, n.barycentric);
         let surface = self.numbers[index];
         let found = match &self.truths[index] {
-            Truth::Surface(s, closed) => {
-                let foot = closest_from(s, *closed, p, uv);
+            Truth::Surface(sheet, closed) => {
+                let mut foot = closest_from(sheet.surface(), *closed, p, uv);
+                if !sheet.reaches(foot.uv, RIM * self.chord_tol) {
+                    let point = sheet.surface().eval(sheet.surface().clamped(uv));
+                    foot = Foot { uv, point, distance: point.distance(p), converged: false };
+                }
                 OnSurface { surface, uv: foot.uv, point: foot.point, distance: foot.distance }
             }
             Truth::Triangles => OnSurface { surface, uv, point: n.point, distance: n.distance },
@@ -305,9 +320,13 @@ impl SurfaceSet {
 
     /// Moves a candidate onto surface and segment, and keeps it if it reaches both and is new.
     fn polish(&self, index: usize, uv: DVec2, a: DVec3, b: DVec3, out: &mut Vec<(usize, SegmentHit)>) {
-        let Truth::Surface(surface, closed) = &self.truths[index] else { return };
-        let foot = line_from(surface, *closed, a, b - a, uv);
-        if foot.residual > SAME * self.diagonal || !(-1e-12..=1.0 + 1e-12).contains(&foot.t) {
+        let Truth::Surface(sheet, closed) = &self.truths[index] else { return };
+        let same = SAME * self.diagonal;
+        let foot = line_from(sheet.surface(), *closed, a, b - a, uv);
+        if foot.residual > same || !(-1e-12..=1.0 + 1e-12).contains(&foot.t) {
+            return;
+        }
+        if !sheet.reaches(foot.uv, (RIM * self.chord_tol).max(same)) {
             return;
         }
         self.keep(index, SegmentHit { surface: self.numbers[index], uv: foot.uv, point: foot.point, t: foot.t }, out);
@@ -324,10 +343,29 @@ impl SurfaceSet {
     }
 }
 
+/// Which vertices lie at a border: of a face all that belong to an edge of one triangle only, because its loops need not
+/// be grid lines.
+fn border_vertices(sheet: &Sheet, mesh: &SurfaceMesh) -> Vec<bool> {
+    if let Sheet::Whole(surface) = sheet {
+        let [u, v] = surface.domain();
+        return mesh.uv.iter().map(|uv| u.contains(&uv.x) || v.contains(&uv.y)).collect();
+    }
+    let mut edges: Vec<[u32; 2]> = Vec::with_capacity(3 * mesh.triangles.len());
+    for t in &mesh.triangles {
+        edges.extend([[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]].map(|[a, b]| [a.min(b), a.max(b)]));
+    }
+    edges.sort_unstable();
+    let mut out = vec![false; mesh.points.len()];
+    for same in edges.chunk_by(|a, b| a == b).filter(|same| same.len() == 1) {
+        same[0].iter().for_each(|&k| out[k as usize] = true);
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::geom::Knots;
+    use crate::kernel::geom::{Knots, Surface};
 
     fn graph(f: impl Fn(f64, f64) -> f64, n: usize, low: DVec2, high: DVec2) -> Arc<Surface> {
         let breaks: Vec<f64> = (0..=n).map(|i| i as f64 / n as f64).collect();

@@ -12,7 +12,7 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::kernel::geom::{Basis, BezierPatch, Knots, Surface};
+use crate::kernel::geom::{Basis, BezierPatch, Curve, Knots, Surface};
 
 /// How finely to tessellate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -125,6 +125,49 @@ pub fn grid_lines(surface: &Surface, options: &TessellateOptions) -> ([Vec<f64>;
         line
     });
     (lines, capped)
+}
+
+/// Puts `extra` among increasing grid lines. A line that is as good as there is moved: two lines a hair apart
+/// would make slivers.
+pub fn add_lines(line: &mut Vec<f64>, extra: &[f64]) {
+    let width = line[line.len() - 1] - line[0];
+    for &t in extra {
+        match line.iter().position(|x| (x - t).abs() < 1e-9 * width) {
+            Some(at) => line[at] = t,
+            None => line.push(t),
+        }
+    }
+    line.sort_by(f64::total_cmp);
+}
+
+/// Parameters along a curve whose polyline keeps the chord tolerance, and whether the cap cut them short. They depend
+/// on nothing but the curve, the tolerance and the cap.
+pub fn curve_parameters(curve: &Curve, chord_tol: f64, max_segments: usize) -> (Vec<f64>, bool) {
+    let breaks = curve.knots().breaks();
+    let straight = curve.knots().degree() == 1;
+    let tol = chord_tol.max(f64::MIN_POSITIVE);
+    let parts: Vec<f64> = breaks
+        .windows(2)
+        .map(|pair| {
+            // A polynomial piece of degree 1 is straight; a rational one is as well, only unevenly run.
+            if straight {
+                return 1.0;
+            }
+            let h = pair[1] - pair[0];
+            let bend =
+                (0..=8).map(|i| curve.derivatives(pair[0] + h * f64::from(i) / 8.0, 2)[2].length()).fold(0.0, f64::max);
+            (1.2 * bend * h * h / (8.0 * tol)).sqrt().ceil().max(2.0)
+        })
+        .collect();
+    let total: f64 = parts.iter().sum();
+    let scale = (max_segments as f64 / total).min(1.0);
+    let mut out = vec![breaks[0]];
+    for (pair, n) in breaks.windows(2).zip(&parts) {
+        let n = (n * scale).floor().max(1.0) as usize;
+        out.extend((1..n).map(|i| pair[0] + (pair[1] - pair[0]) * i as f64 / n as f64));
+        out.push(pair[1]);
+    }
+    (out, scale < 1.0)
 }
 
 /// Bounds of |Suu|, |Suv|, |Svv| of a Bezier piece in its own [0, 1]^2.

@@ -26,15 +26,18 @@ pub struct Sheet {
 impl Sheet {
     /// Triangulates a surface to a chord tolerance, or takes a mesh as it is.
     pub fn new(body: &Body, chord_tol: f64) -> Self {
-        let (points, triangles, uv, surface, capped) = match body {
-            Body::Surface(surface) => {
+        // Of a face the whole surface, too: curves are cut down to it at the end.
+        let (points, triangles, uv, surface, capped) = match (body, body.surface()) {
+            (_, Some(surface)) => {
                 let mesh = tessellate(surface, &TessellateOptions::new(chord_tol));
                 (mesh.points, mesh.triangles, mesh.uv, Some(Arc::clone(surface)), mesh.capped)
             }
-            Body::Facets(facets) => {
+            (Body::Facets(facets), None) => {
                 let mesh = facets.mesh();
                 (mesh.points().to_vec(), mesh.triangles().to_vec(), Vec::new(), None, false)
             }
+            // Not reached: what has no surface is a mesh.
+            (_, None) => Default::default(),
         };
         let tree = TriTree::new(points.clone(), &triangles);
         Self { points, triangles, uv, tree, surface, capped }

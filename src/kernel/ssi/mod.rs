@@ -9,6 +9,7 @@
 mod bernstein;
 pub mod biarc;
 mod binormal;
+pub mod clip;
 mod contact;
 mod correct;
 mod derivative_bounds;

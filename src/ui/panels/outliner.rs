@@ -69,7 +69,7 @@ fn row(ui: &mut Ui, editor: &mut Editor, entity: &Entity, shown: &[&std::sync::A
     ui.painter().rect_filled(rect, 3.0, fill);
     let color = if entity.visible { t.text[0] } else { t.text[1] };
     let icon = match entity.shape {
-        Shape::Surface(_) => Icon::Surface,
+        Shape::Surface(_) | Shape::Face(_) => Icon::Surface,
         Shape::Curve(_) => Icon::Curve,
         Shape::Patch(_) => Icon::Patch,
         Shape::Mesh(_) => Icon::Mesh,

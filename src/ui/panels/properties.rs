@@ -99,6 +99,16 @@ fn one(ui: &mut Ui, editor: &mut Editor, entity: &Entity, unit: Unit) {
                 }
                 surface(ui, s);
             }
+            Shape::Face(face) => {
+                super::property(ui, "Kind", "Trimmed face");
+                if let Some(number) = editor.document().surfaces().position(|(id, _)| id == entity.id) {
+                    super::property(ui, "Number", number.to_string());
+                }
+                super::property(ui, "Lies on", face.kind.name());
+                super::property(ui, "Loops", face.rings().len().to_string());
+                super::property(ui, "Edges", face.rings().iter().map(|r| r.edges.len()).sum::<usize>().to_string());
+                surface(ui, face.surface());
+            }
             Shape::Curve(c) => {
                 super::property(ui, "Kind", "Curve");
                 curve(ui, c);

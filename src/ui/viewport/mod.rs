@@ -210,6 +210,12 @@ impl Viewport {
         self.frame_times[..n].iter().sum::<f32>() / n as f32
     }
 
+    /// Draws the whole surfaces under trimmed faces, or the faces again.
+    pub fn toggle_whole_surfaces(&mut self) {
+        self.scene.show_whole_surfaces(!self.scene.shows_whole_surfaces());
+        self.seen_revision = None;
+    }
+
     /// Follows the document, the camera's moves and the workers. Returns whether a repaint is wanted.
     pub fn advance(&mut self, document: &Document, revision: u64, jobs: &mut Jobs, now: f64) -> bool {
         if self.seen_revision != Some(revision) {

@@ -150,6 +150,8 @@ pub fn curve_name(entity: &Entity, curve: &CurveRef) -> String {
             let chain = entity.facets().and_then(|f| f.curves().get(*k as usize));
             chain.map_or_else(|| format!("curve {k}"), |c| c.name.clone())
         }
+        CurveRef::Edge(_, 0, edge) => format!("edge {edge}"),
+        CurveRef::Edge(_, ring, edge) => format!("hole {ring} edge {edge}"),
         CurveRef::Border(_, Side::UMin) => "border u min".to_owned(),
         CurveRef::Border(_, Side::UMax) => "border u max".to_owned(),
         CurveRef::Border(_, Side::VMin) => "border v min".to_owned(),

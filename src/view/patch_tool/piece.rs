@@ -152,9 +152,18 @@ impl Picked {
             }
             Piece::Edge { face, ring, edge, from, to } => {
                 let item = scene.surface(*face).ok_or(PieceError::Missing { what: "surface", number: *face })?;
-                let side = Side::ALL.get(*edge).filter(|_| *ring == 0);
-                let side = side.ok_or(PieceError::Edge { ring: *ring, edge: *edge })?;
-                by_fractions(CurveRef::Border(item.id(), *side), item, *from, *to)
+                let missing = PieceError::Edge { ring: *ring, edge: *edge };
+                let curve = match item.entity.face() {
+                    Some(face) => {
+                        face.edge(*ring, *edge).ok_or(missing)?;
+                        CurveRef::Edge(item.id(), *ring as u32, *edge as u32)
+                    }
+                    None => {
+                        let side = Side::ALL.get(*edge).filter(|_| *ring == 0).ok_or(missing)?;
+                        CurveRef::Border(item.id(), *side)
+                    }
+                };
+                by_fractions(curve, item, *from, *to)
             }
             Piece::Curve { id, from, to } => {
                 let found = scene.items().iter().find(|i| i.kind == ItemKind::Curve && i.number == Some(*id));
@@ -202,6 +211,19 @@ impl Picked {
                         let at = if fixed == Direction::U { IsoAt::U(c) } else { IsoAt::V(c) };
                         Ok(Piece::Iso { surface: number, at, from, to })
                     }
+                    // The edges of a face are those of its loops: a border of the surface under it is an iso-curve.
+                    CurveRef::Border(_, side) if item.entity.face().is_some() => {
+                        let surface = item.geometry.surface().ok_or(PieceError::Gone)?;
+                        let [u, v] = surface.domain();
+                        let at = match side {
+                            Side::VMin => IsoAt::V(v[0]),
+                            Side::UMax => IsoAt::U(u[1]),
+                            Side::VMax => IsoAt::V(v[1]),
+                            Side::UMin => IsoAt::U(u[0]),
+                        };
+                        let [from, to] = turned(*range);
+                        Ok(Piece::Iso { surface: number, at, from, to })
+                    }
                     CurveRef::Border(_, side) => {
                         let [from, to] = turned(fractions(item, curve, *range)?);
                         Ok(Piece::Edge { face: number, ring: 0, edge: side as usize, from, to })
@@ -209,6 +231,10 @@ impl Picked {
                     CurveRef::Chain(_, chain) | CurveRef::GridLine(_, chain) => {
                         let [from, to] = turned(fractions(item, curve, *range)?);
                         Ok(Piece::Chain { mesh: number, chain: chain as usize, from, to })
+                    }
+                    CurveRef::Edge(_, ring, edge) => {
+                        let [from, to] = turned(fractions(item, curve, *range)?);
+                        Ok(Piece::Edge { face: number, ring: ring as usize, edge: edge as usize, from, to })
                     }
                     CurveRef::Free(_) => {
                         let [from, to] = turned(fractions(item, curve, *range)?);
