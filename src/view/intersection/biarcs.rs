@@ -78,7 +78,9 @@ mod tests {
         let floor = square(DVec3::Z * 0.25, DVec3::X * 1.5, DVec3::Y * 1.5);
         let found = met(&document([graph(|x, y| x * x + y * y), floor]));
         let fit = biarcs(&found, 0).unwrap();
-        assert!(fit.within && fit.bound <= found.result.tol && fit.count >= 4);
+        // A circle in both domains: one biarc for each half, as each is monotone in one parameter.
+        assert!(fit.within && fit.bound <= found.result.tol, "{}", fit.bound);
+        assert!(fit.count >= 2, "{}", fit.count);
         assert_eq!(fit.drawn.len(), 2 * fit.count);
         for joint in &fit.joints {
             assert!((joint.truncate().length() - 0.5).abs() < 10.0 * found.result.tol, "{joint}");
