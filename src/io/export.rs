@@ -1,4 +1,7 @@
-//! A document as triangles (STL, OBJ) or structured grids (Plot3D).
+//! A document for other programs: as B-splines (STEP, IGES), triangles (STL, OBJ) or structured grids (Plot3D).
+//!
+//! What leaves is accounted for before it is written: how far borders of neighbours are apart, and for B-splines the
+//! largest angle between the normals on both sides of an edge ([`crate::model::shell`]).
 //!
 //! Surfaces and patches are divided together, so that edges they share have the same points in both (see
 //! [`crate::kernel::mesh::structured`]); the result says by how much borders had to be moved for that, before anything
@@ -8,13 +11,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::plot3d::{self, Encoding};
-use super::{Format, SaveError, Saved, WriteError, atomic, obj, stl};
+use super::{Format, SaveError, Saved, atomic, iges, obj, step, stl};
 use crate::kernel::geom::{Side, Surface};
 use crate::kernel::job::Job;
 use crate::kernel::mesh::grid::Grid;
 use crate::kernel::mesh::structured::{Counts, GridOptions, GridSet, Spacing, StructuredError, structured, welded};
 use crate::kernel::mesh::tri_mesh::{Group, MeshError, TriMesh};
 use crate::model::document::{Document, Shape};
+use crate::model::shell::Shells;
 
 /// The points of an edge of a Plot3D grid where nothing else is asked for.
 pub const POINTS: usize = 33;
@@ -78,10 +82,16 @@ pub struct ExportSummary {
     pub cells: usize,
     /// Pairs of borders that are one edge.
     pub seams: usize,
-    /// The largest distance of two such borders, which the file closes.
+    /// The largest distance of two such borders. Triangles and grids close it; B-splines leave as they are.
     pub largest_gap: f64,
     /// Between which two it is, by name.
     pub largest_between: Option<[String; 2]>,
+    /// The largest angle between the normals on both sides of a seam; for B-splines only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub largest_angle_deg: Option<f64>,
+    /// Between which two it is, by name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub angle_between: Option<[String; 2]>,
     /// How far the middles of cells and cell edges are from the surfaces at most.
     pub chord_error: f64,
     /// What the format cannot hold, and what a cap cut short.
@@ -101,15 +111,20 @@ pub struct Prepared {
 enum Content {
     Triangles(TriMesh),
     Grids(Vec<Grid>),
+    Splines(Document),
 }
 
-/// Makes triangles or grids of a document, without writing anything.
+/// Makes triangles, grids or shells of a document, without writing anything. Projects need no preparation and are none of
+/// these.
 pub fn prepare(
     document: &Document,
     format: Format,
     options: &ExportOptions,
     job: &Job,
 ) -> Result<Prepared, ExportError> {
+    if matches!(format, Format::Step | Format::Iges) {
+        return splines(document, format, options);
+    }
     let grids = format == Format::Plot3d;
     let mut summary = ExportSummary::default();
     let mut surfaces: Vec<Arc<Surface>> = Vec::new();
@@ -140,14 +155,13 @@ pub fn prepare(
     let set = if surfaces.is_empty() {
         GridSet { complete: true, ..GridSet::default() }
     } else {
-        let tolerances = document.tolerances();
         let chord = CHORD * document.bounds().diagonal().max(f64::MIN_POSITIVE);
         let counts =
             options.counts.unwrap_or(if grids { Counts::Points(POINTS) } else { Counts::ChordTolerance(chord) });
         let made = GridOptions {
             spacing: options.spacing,
             clusters: options.clusters.clone(),
-            ..GridOptions::new(counts, options.joining.unwrap_or(tolerances.joining))
+            ..GridOptions::new(counts, joining(document, options))
         };
         structured(&surfaces, &made, job)?
     };
@@ -173,8 +187,41 @@ pub fn prepare(
             let cells = |g: &Grid| g.counts().iter().map(|&c| c.saturating_sub(1).max(1)).product::<usize>();
             (grids.iter().map(|g| g.points().len()).sum(), grids.iter().map(cells).sum())
         }
+        Content::Splines(_) => (0, 0),
     };
     Ok(Prepared { format, content, summary })
+}
+
+/// A document that leaves as B-splines, and how well its surfaces fit.
+fn splines(document: &Document, format: Format, options: &ExportOptions) -> Result<Prepared, ExportError> {
+    let held = |e: &crate::model::document::Entity| e.facets().is_none();
+    if !document.entities().iter().any(|e| held(e)) {
+        return Err(ExportError::Nothing { format, expected: "surfaces, patches or curves" });
+    }
+    let seams = Shells::of(document, joining(document, options)).seams;
+    let mut notes = Vec::new();
+    if seams.non_manifold > 0 {
+        notes.push(format!("{} edges have more than two faces; meshers may not take that", seams.non_manifold));
+    }
+    if seams.one_sided > 0 {
+        notes.push(format!("{} shells cannot be turned so that all their faces look the same way", seams.one_sided));
+    }
+    let summary = ExportSummary {
+        surfaces: document.entities().iter().filter(|e| e.surface().is_some()).count(),
+        seams: seams.count,
+        largest_gap: seams.largest_gap,
+        largest_between: seams.gap_between,
+        largest_angle_deg: Some(seams.largest_angle_deg),
+        angle_between: seams.angle_between,
+        notes,
+        ..ExportSummary::default()
+    };
+    Ok(Prepared { format, content: Content::Splines(document.clone()), summary })
+}
+
+/// What two borders may be apart and still be one edge.
+fn joining(document: &Document, options: &ExportOptions) -> f64 {
+    options.joining.unwrap_or(document.tolerances().joining)
 }
 
 /// The grids of surfaces and patches and the blocks, in the order of the document.
@@ -214,7 +261,11 @@ fn mesh_of(document: &Document, set: &GridSet, names: &[String]) -> Result<TriMe
 }
 
 /// Writes what was prepared, in one step.
-pub fn write(path: &Path, prepared: &Prepared, options: &ExportOptions) -> Result<Saved, WriteError> {
+pub fn write(path: &Path, prepared: &Prepared, options: &ExportOptions) -> Result<Saved, SaveError> {
+    let summary = &prepared.summary;
+    let mut saved = Saved { entities: summary.surfaces + summary.as_they_are, ..Saved::default() };
+    let file_name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let time = std::time::SystemTime::now();
     let bytes = match &prepared.content {
         Content::Grids(grids) => {
             let encoding = if options.ascii {
@@ -228,11 +279,21 @@ pub fn write(path: &Path, prepared: &Prepared, options: &ExportOptions) -> Resul
         Content::Triangles(mesh) if prepared.format == Format::Obj => obj::write(mesh).into_bytes(),
         Content::Triangles(mesh) if options.ascii => stl::write_ascii(mesh).into_bytes(),
         Content::Triangles(mesh) => stl::write_binary(mesh),
+        Content::Splines(document) => {
+            let (text, written) = if prepared.format == Format::Step {
+                let joining = joining(document, options);
+                step::write(document, &step::StepOptions { file_name, time, joining })
+            } else {
+                iges::write(document, &iges::IgesOptions { file_name, time })
+                    .map_err(|source| SaveError::Iges { path: path.into(), source })?
+            };
+            saved = written;
+            text.into_bytes()
+        }
     };
     atomic::write(path, &bytes)?;
-    let summary = &prepared.summary;
-    let entities = summary.surfaces + summary.as_they_are;
-    Ok(Saved { entities, notes: summary.notes.clone(), export: Some(summary.clone()) })
+    saved.notes.extend(summary.notes.iter().cloned());
+    Ok(Saved { export: Some(summary.clone()), ..saved })
 }
 
 /// Both steps.
@@ -244,5 +305,5 @@ pub(super) fn save(
 ) -> Result<Saved, SaveError> {
     let prepared = prepare(document, format, options, &Job::new());
     let prepared = prepared.map_err(|source| SaveError::Export { path: path.into(), format, source })?;
-    Ok(write(path, &prepared, options)?)
+    write(path, &prepared, options)
 }

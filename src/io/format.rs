@@ -7,7 +7,7 @@ use std::path::Path;
 pub enum Format {
     /// IGES 5.3, fixed 80-column ASCII.
     Iges,
-    /// STEP (ISO 10303-21); read only.
+    /// STEP (ISO 10303-21); AP203, AP214 and AP242 in, AP242 out.
     Step,
     /// STL, ASCII or binary.
     Stl,
@@ -58,7 +58,7 @@ impl Format {
 
     /// All formats for an error message.
     pub fn list() -> &'static str {
-        "IGES (.igs, .iges), STEP (.stp, .step; read only), STL (.stl), OBJ (.obj), Plot3D (.xyz, .p3d, .fmt) or a project \
+        "IGES (.igs, .iges), STEP (.stp, .step), STL (.stl), OBJ (.obj), Plot3D (.xyz, .p3d, .fmt) or a project \
          (.patchwright.ron)"
     }
 

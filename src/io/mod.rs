@@ -17,10 +17,12 @@ mod discrete;
 pub mod export;
 mod format;
 pub mod iges;
+mod number;
 pub mod obj;
 pub mod plot3d;
 pub mod project;
 pub(crate) mod report;
+mod stamp;
 pub mod step;
 pub mod stl;
 mod tidy;
@@ -104,7 +106,7 @@ pub enum SaveError {
         /// What does not fit.
         source: iges::IgesWriteError,
     },
-    /// The document cannot be made into triangles or grids.
+    /// The document cannot be made into what the format holds.
     #[error("cannot save {} as {}: {source}", path.display(), format.name())]
     Export {
         /// The file.
@@ -113,12 +115,6 @@ pub enum SaveError {
         format: Format,
         /// What is wrong.
         source: export::ExportError,
-    },
-    /// The format can be read but not written.
-    #[error("{} files cannot be written: save as IGES (.igs), STL, OBJ, Plot3D or a project (.patchwright.ron)", format.name())]
-    ReadOnly {
-        /// The format.
-        format: Format,
     },
     /// The document does not fit into a project.
     #[error("cannot save {}: {source}", path.display())]
@@ -141,7 +137,7 @@ pub enum SaveError {
 pub struct SaveOptions {
     /// The format; by extension when left out.
     pub format: Option<Format>,
-    /// How surfaces become triangles (STL, OBJ) or grids (Plot3D).
+    /// What is one edge, and how surfaces become triangles (STL, OBJ) or grids (Plot3D).
     pub export: export::ExportOptions,
 }
 
@@ -152,7 +148,7 @@ pub struct Saved {
     pub entities: usize,
     /// What the format could not hold, one line each.
     pub notes: Vec<String>,
-    /// How surfaces became triangles or grids.
+    /// How surfaces became triangles or grids, or how well they fit as B-splines.
     pub export: Option<export::ExportSummary>,
 }
 
@@ -189,9 +185,9 @@ pub fn save_spec(path: &Path, spec: &HealSpec) -> Result<(), SaveError> {
 pub fn save(path: &Path, document: &Document, options: &SaveOptions) -> Result<Saved, SaveError> {
     let unknown = || SaveError::Unknown { path: path.into() };
     match options.format.or_else(|| Format::of_name(path)).ok_or_else(unknown)? {
-        Format::Iges => save_iges(path, document, &[]),
-        format @ (Format::Stl | Format::Obj | Format::Plot3d) => export::save(path, document, format, &options.export),
-        format @ Format::Step => Err(SaveError::ReadOnly { format }),
+        format @ (Format::Iges | Format::Step | Format::Stl | Format::Obj | Format::Plot3d) => {
+            export::save(path, document, format, &options.export)
+        }
         Format::Project => {
             let text = project::write(document).map_err(|source| SaveError::Project { path: path.into(), source })?;
             atomic::write(path, text.as_bytes())?;

@@ -8,6 +8,7 @@ pub mod history;
 pub mod replay;
 pub mod resolve;
 pub mod selection;
+pub mod shell;
 pub mod spec;
 pub mod topology;
 pub mod traces;

@@ -1,5 +1,5 @@
-//! The export dialog: what goes into an STL, OBJ or Plot3D file, how it is divided, and how large the seam gaps are,
-//! before anything is written.
+//! The export dialog: what goes into a STEP, IGES, STL, OBJ or Plot3D file, how it is divided, and how large the gaps and
+//! the normal angles between neighbours are, before anything is written.
 
 use std::path::PathBuf;
 
@@ -54,7 +54,7 @@ impl ExportForm {
         let which = if document.patches().next().is_some() { Which::Patches } else { Which::Visible };
         Self {
             which,
-            format: Format::Plot3d,
+            format: Format::Step,
             by_tolerance: false,
             points: POINTS,
             chord: export::CHORD * document.bounds().diagonal(),
@@ -85,10 +85,10 @@ impl ExportForm {
 
     /// Draws the form.
     pub fn show(&mut self, ui: &mut Ui) -> Answer {
-        ui.heading("Export grid or mesh");
+        ui.heading("Export");
         ui.add_space(6.0);
         Grid::new("export").num_columns(2).spacing(vec2(14.0, 6.0)).show(ui, |ui| self.fields(ui));
-        if matches!(self.spacing, Spacing::Tanh(_)) {
+        if self.divides() && matches!(self.spacing, Spacing::Tanh(_)) {
             self.clusters(ui);
         }
         ui.add_space(6.0);
@@ -107,6 +107,11 @@ impl ExportForm {
         })
     }
 
+    /// Whether surfaces are divided into triangles or grids.
+    fn divides(&self) -> bool {
+        !matches!(self.format, Format::Step | Format::Iges)
+    }
+
     fn fields(&mut self, ui: &mut Ui) {
         ui.label("What");
         ui.horizontal(|ui| {
@@ -120,12 +125,14 @@ impl ExportForm {
         ui.label("Format");
         ui.horizontal(|ui| {
             let before = self.format;
-            for format in [Format::Plot3d, Format::Stl, Format::Obj] {
+            for format in [Format::Step, Format::Iges, Format::Plot3d, Format::Stl, Format::Obj] {
                 ui.selectable_value(&mut self.format, format, format.name());
             }
             if self.format != before {
                 self.by_tolerance = self.format != Format::Plot3d;
                 let extension = match self.format {
+                    Format::Step => "step",
+                    Format::Iges => "igs",
                     Format::Stl => "stl",
                     Format::Obj => "obj",
                     _ => "xyz",
@@ -134,6 +141,9 @@ impl ExportForm {
             }
         });
         ui.end_row();
+        if !self.divides() {
+            return;
+        }
         ui.label("Points");
         ui.horizontal(|ui| {
             ui.selectable_value(&mut self.by_tolerance, false, "On every edge");
@@ -218,7 +228,7 @@ impl ExportForm {
             _ => {
                 ui.horizontal(|ui| {
                     ui.spinner();
-                    ui.label("Dividing the surfaces…");
+                    ui.label(if self.divides() { "Dividing the surfaces…" } else { "Comparing the edges…" });
                 });
             }
         }
@@ -238,9 +248,15 @@ fn summary(ui: &mut Ui, s: &ExportSummary, unit: Unit) {
         if s.as_they_are > 0 {
             line("Meshes and blocks as they are", s.as_they_are.to_string());
         }
-        line("Points and cells", format!("{} and {}", s.points, s.cells));
+        let named = |pair: &Option<[String; 2]>| pair.as_ref().map_or(String::new(), |[a, b]| format!(", {a} to {b}"));
+        let between = named(&s.largest_between);
         line("Shared edges", s.seams.to_string());
-        let between = s.largest_between.as_ref().map_or(String::new(), |[a, b]| format!(", {a} to {b}"));
+        if let Some(angle) = s.largest_angle_deg {
+            line("Largest edge gap", format!("{}{between}", length(s.largest_gap, unit)));
+            line("Largest normal angle", format!("{angle:.3}°{}", named(&s.angle_between)));
+            return;
+        }
+        line("Points and cells", format!("{} and {}", s.points, s.cells));
         line("Largest seam gap", format!("{}{between}; closed in the file", length(s.largest_gap, unit)));
         line("Cells from the surfaces", format!("within {}", length(s.chord_error, unit)));
     });
@@ -263,7 +279,7 @@ fn part(document: &Document, which: Which) -> Document {
 impl Editor {
     /// Opens the export dialog.
     pub fn ask_export(&mut self) {
-        let path = self.beside_source("grid.xyz");
+        let path = self.beside_source("patches.step");
         self.dialog = Some(Dialog::Export(Box::new(ExportForm::new(self.document(), path))));
     }
 
@@ -318,6 +334,9 @@ impl Editor {
         let name = super::files::file_name(path);
         let gap = saved.export.as_ref().map_or(0.0, |e| e.largest_gap);
         let gap = length(gap, self.document().unit);
-        self.say(format!("Exported {} entities to {name}; the largest seam gap closed was {gap}", saved.entities));
+        self.say(format!(
+            "Exported {} entities to {name}; the largest gap between edges that meet is {gap}",
+            saved.entities
+        ));
     }
 }

@@ -1,5 +1,5 @@
-//! Writing IGES 5.3: surfaces as 128, curves as 126, curves on surfaces as 142, names as property 406 form 15, colours
-//! as 314.
+//! Writing IGES 5.3: surfaces as 128, trimmed faces as 144 with their curves in the parameter plane and in space, curves as
+//! 126, curves on surfaces as 142, names as property 406 form 15, colours as 314.
 //!
 //! Numbers are written with the fewest digits that give the same double back (17 at most), so that reading is
 //! bit for bit. For other readers: knots are clamped (exactly refined where the document's are not), weights are
@@ -13,7 +13,11 @@ use glam::DVec3;
 
 use super::header;
 use crate::io::Saved;
+use crate::io::number::real;
+use crate::io::stamp::civil;
+use crate::kernel::geom::trim::{EdgeRole, Face};
 use crate::kernel::geom::{Aabb, Curve, Knots, Surface};
+use crate::kernel::tol::Tolerances;
 use crate::model::document::{Document, EntityId, Shape};
 use crate::model::traces::SurfaceTrace;
 
@@ -86,8 +90,9 @@ pub fn write_with_traces(
             Shape::Curve(curve) => curve_record(curve),
             Shape::Mesh(_) | Shape::Block(_) => continue,
             Shape::Face(face) => {
-                saved.notes.push(format!("`{}`: a trimmed face, written as its whole surface", entity.name));
-                surface_record(face.surface())
+                let (record, surface) = writer.face(face);
+                places.insert(entity.id, surface);
+                record
             }
         };
         if let Some(property) = property {
@@ -96,7 +101,9 @@ pub fn write_with_traces(
             record.integer(property);
         }
         let status = if entity.visible { "00000000" } else { "01000000" };
-        places.insert(entity.id, writer.add(&record, &Attributes { status, color, form: 0 }));
+        let number = writer.add(&record, &Attributes { status, color, form: 0 });
+        // Curves lie on the surface under a face.
+        places.entry(entity.id).or_insert(number);
         saved.entities += 1;
     }
     for trace in traces {
@@ -168,16 +175,6 @@ fn curve_record(curve: &Curve) -> Record {
     curve.domain().iter().for_each(|&t| record.real(t));
     (0..3).for_each(|_| record.real(0.0));
     record
-}
-
-/// The shortest text that reads back as the same number, always with a decimal point.
-fn real(value: f64) -> String {
-    let text = format!("{value:?}");
-    match text.split_once('e') {
-        Some((mantissa, exponent)) if mantissa.contains('.') => format!("{mantissa}E{exponent}"),
-        Some((mantissa, exponent)) => format!("{mantissa}.E{exponent}"),
-        None => text.strip_suffix('0').filter(|t| t.ends_with('.')).map_or(text.clone(), str::to_owned),
-    }
 }
 
 /// Free-format values, broken into lines of a given width.
@@ -272,6 +269,39 @@ struct Writer {
 }
 
 impl Writer {
+    /// The trimmed surface (144) of a face and the entry of the surface under it; what it consists of is added before it.
+    fn face(&mut self, face: &Face) -> (Record, usize) {
+        let dependent = |status| Attributes { status, ..Attributes::default() };
+        let surface = self.add(&surface_record(face.surface()), &dependent("00010000"));
+        let mut record = Record::new(144);
+        record.integer(surface);
+        record.integer(1);
+        record.integer(face.rings().len() - 1);
+        for ring in face.rings() {
+            let (mut in_plane, mut in_space) = (Vec::new(), Vec::new());
+            for edge in &ring.edges {
+                let turned = |curve: &Curve| if edge.reversed { curve.reversed() } else { curve.clone() };
+                in_plane.push(self.add(&curve_record(&turned(&edge.pcurve)), &dependent("00010500")));
+                // A pole is a point in space and no curve there.
+                if edge.role != EdgeRole::Pole {
+                    in_space.push(self.add(&curve_record(&turned(&edge.curve)), &dependent("00010000")));
+                }
+            }
+            let [plane, space] = [(in_plane, "00010500"), (in_space, "00010000")].map(|(parts, status)| {
+                let mut composite = Record::new(102);
+                composite.integer(parts.len());
+                parts.iter().for_each(|&part| composite.integer(part));
+                if parts.is_empty() { 0 } else { self.add(&composite, &dependent(status)) }
+            });
+            let mut bound = Record::new(142);
+            // Made by no particular method; the curve in the parameter plane is preferred.
+            [0, surface, plane, space, 1].iter().for_each(|&v| bound.integer(v));
+            let bound = self.add(&bound, &dependent("00010000"));
+            record.integer(bound);
+        }
+        (record, surface)
+    }
+
     /// Adds an entity and says which directory entry it got.
     fn add(&mut self, record: &Record, attributes: &Attributes) -> usize {
         let lines = record.closed();
@@ -337,7 +367,7 @@ fn global_section(document: &Document, options: &IgesOptions) -> Vec<String> {
     record.integer(1);
     record.real(0.0);
     record.text(&date);
-    record.real(document.tolerances().follow);
+    record.real(Tolerances::of(&bounds).follow);
     record.real(bounds.max_abs());
     record.text("");
     record.text("");
@@ -349,18 +379,8 @@ fn global_section(document: &Document, options: &IgesOptions) -> Vec<String> {
 
 /// YYYYMMDD.HHNNSS of a time, in UTC.
 fn date(time: SystemTime) -> String {
-    let seconds = time.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_secs());
-    let (days, second) = (seconds / 86400, seconds % 86400);
-    // Days to a civil date: Hinnant, "chrono-compatible low-level date algorithms", counted from 1 March 0000.
-    let z = days + 719_468;
-    let (era, day_of_era) = (z / 146_097, z % 146_097);
-    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let shifted = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * shifted + 2) / 5 + 1;
-    let month = if shifted < 10 { shifted + 3 } else { shifted - 9 };
-    let year = year_of_era + era * 400 + u64::from(month <= 2);
-    format!("{year:04}{month:02}{day:02}.{:02}{:02}{:02}", second / 3600, second / 60 % 60, second % 60)
+    let [year, month, day, hour, minute, second] = civil(time);
+    format!("{year:04}{month:02}{day:02}.{hour:02}{minute:02}{second:02}")
 }
 
 #[cfg(test)]
@@ -384,15 +404,8 @@ mod tests {
     }
 
     #[test]
-    fn dates_are_those_of_the_calendar() {
-        for (seconds, expected) in [
-            (0, "19700101.000000"),
-            (951_782_400, "20000229.000000"),
-            (1_709_164_799, "20240228.235959"),
-            (4_102_444_800, "21000101.000000"),
-        ] {
-            assert_eq!(date(SystemTime::UNIX_EPOCH + Duration::from_secs(seconds)), expected);
-        }
+    fn dates_have_two_digits_for_each_part() {
+        assert_eq!(date(SystemTime::UNIX_EPOCH + Duration::from_secs(951_782_400)), "20000229.000000");
     }
 
     #[test]

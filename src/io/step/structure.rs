@@ -132,7 +132,8 @@ impl Walk<'_, '_, '_> {
         };
         self.met.insert(number);
         let Some(record) = instance.records.first() else { return };
-        let name = match record.values.first() {
+        // A complex instance has its name in a record of its own.
+        let name = match instance.record("REPRESENTATION_ITEM").unwrap_or(record).values.first() {
             Some(Value::String(raw)) if !matches!(*raw, "" | "NONE") => part21::text(raw).into_owned(),
             _ => outer.name.clone(),
         };
