@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::{CliError, Common, Exit};
+use super::{CliError, Common, Exit, ProgressLine};
 use crate::io::{self, ImportReport, Severity};
 use crate::kernel::geom::{Aabb, Knots};
 use crate::kernel::mesh::facets::{FacetCurve, FacetCurveKind, Facets};
 use crate::kernel::mesh::grid::Grid;
+use crate::model::defects::{self, DefectKind, DefectOptions, Defects};
 use crate::model::document::{Document, Entity, Shape};
 use crate::model::topology::{Meets, edges};
 
@@ -20,6 +21,9 @@ pub struct Args {
     /// List every entity, and every line of the import report
     #[arg(long)]
     pub all: bool,
+    /// Look for faces that run through themselves too, which takes longest
+    #[arg(long)]
+    pub self_intersections: bool,
 }
 
 #[derive(Serialize)]
@@ -35,6 +39,8 @@ struct Info {
     bounds: Option<Bounds>,
     /// How edges of faces and borders of whole surfaces meet.
     borders: BorderInfo,
+    /// What is broken.
+    defects: Defects,
     entities: Vec<EntityInfo>,
     import: ImportReport,
 }
@@ -272,6 +278,13 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
             border.joining, border.free, border.partly, border.shared, border.gaps, border.largest_gap, border.poles
         ));
     }
+    let options = DefectOptions { self_intersections: args.self_intersections, ..DefectOptions::of(document) };
+    let job = super::job();
+    let found = {
+        let _progress = ProgressLine::watch(&job);
+        defects::find(document, &options, &job)
+    };
+    say_defects(&found, document, args.all, common);
     if args.all {
         for entity in &entities {
             common.say(format!("  {}", entity.line()));
@@ -298,10 +311,37 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         meshes,
         bounds: Bounds::of(&bounds),
         borders: border,
+        defects: found,
         entities,
         import: opened.report,
     })?;
     Ok(Exit::Done)
+}
+
+/// Prints how many defects of each kind there are and the worst of them; or all of them.
+fn say_defects(found: &Defects, document: &Document, all: bool, common: &Common) {
+    if found.faces == 0 {
+        return;
+    }
+    let unit = document.unit.symbol();
+    for kind in DefectKind::ALL {
+        let of_kind: Vec<_> = found.of(kind).collect();
+        let Some(worst) = of_kind.first() else { continue };
+        let (measure, is_length) = kind.measure();
+        let unit = if is_length && !unit.is_empty() { format!(" {unit}") } else { String::new() };
+        common.say(format!("{}: {}, the worst {:.3e}{unit} ({measure})", kind.name(), of_kind.len(), worst.size));
+        for defect in of_kind.iter().filter(|_| all) {
+            let (faces, at) = (&defect.faces, defect.at);
+            common.say(format!("  {:.3e}{unit} at ({}, {}, {}), faces {faces:?}", defect.size, at.x, at.y, at.z));
+        }
+    }
+    if found.list.is_empty() {
+        common.say("no defects found");
+    }
+    found.notes.iter().for_each(|note| common.warn(format!("warning: {note}")));
+    if !found.complete {
+        common.warn("warning: not everything was looked at");
+    }
 }
 
 /// Prints the report from a severity on, equal lines counted together.

@@ -1,6 +1,7 @@
 //! What a user has: documents, the commands that change them, and undo.
 
 pub mod command;
+pub mod defects;
 pub mod document;
 pub mod examples;
 pub mod healing;

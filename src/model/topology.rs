@@ -43,7 +43,7 @@ pub enum Meets {
 }
 
 /// Names an edge as patch specifications do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize)]
 pub struct EdgeAt {
     /// The number of the face or surface.
     pub face: usize,

@@ -15,6 +15,7 @@ use super::files::Files;
 use super::hints::{self, Hints};
 use super::numpad::{Listener, Numpad};
 use super::palette;
+use super::panels::defects::DefectSearch;
 use super::panels::uv::{self, UvView};
 use super::settings::Settings;
 use super::tools::Tool;
@@ -114,6 +115,7 @@ impl App {
             tool: Tool::Select,
             pickable: Filter { iso_lines: true, ..Filter::ALL },
             pick_list: None,
+            defects: DefectSearch::default(),
             page: Page::Tool,
             dialog: None,
             palette: None,
@@ -248,6 +250,7 @@ impl eframe::App for App {
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
         self.editor.poll_files(ctx);
         self.editor.poll_export();
+        self.editor.poll_defects();
         if self.editor.poll_tool() && !ctx.input(|i| i.focused) {
             // Whoever went elsewhere meanwhile is told that the heal is done.
             let attention = egui::UserAttentionType::Informational;

@@ -9,6 +9,7 @@ use super::dialogs::{Dialog, PathField, Problem, SaveWhat, Then};
 use super::files::Files;
 use super::linked::Linked;
 use super::palette::Palette;
+use super::panels::defects::DefectSearch;
 use super::panels::uv::UvView;
 use super::settings::{Settings, Theme};
 use super::tools::{PickList, Tool};
@@ -33,6 +34,8 @@ pub enum Page {
     Tool,
     /// The table of patches.
     Patches,
+    /// What is broken.
+    Defects,
     /// The list of changes.
     History,
     /// The list of computations.
@@ -43,9 +46,10 @@ pub enum Page {
 
 impl Page {
     /// All pages with their titles.
-    pub const ALL: [(Self, &'static str); 5] = [
+    pub const ALL: [(Self, &'static str); 6] = [
         (Self::Tool, "Tool"),
         (Self::Patches, "Patches"),
+        (Self::Defects, "Defects"),
         (Self::History, "History"),
         (Self::Jobs, "Jobs"),
         (Self::Report, "Report"),
@@ -85,6 +89,8 @@ pub struct Editor {
     pub pickable: Filter,
     /// The list of everything under the cursor, when it is open.
     pub pick_list: Option<PickList>,
+    /// What is broken.
+    pub defects: DefectSearch,
     /// The page of the right panel.
     pub page: Page,
     /// The dialog in front of everything.
@@ -203,6 +209,9 @@ impl Editor {
             Action::KeepCurves | Action::ExportCurves => {
                 need(self.has_found_curves(), "no intersection curves have been found")
             }
+            Action::FindDefects => need(self.document().surfaces().next().is_some(), "there is no surface to look at"),
+            Action::NextDefect | Action::PreviousDefect => self.can_step_defects(),
+            Action::FixDefect => self.can_fix_defect(),
             Action::FrameAll => need(!self.document().entities().is_empty(), "the model is empty"),
             Action::FrameSelection => need(selected, "nothing is selected"),
             Action::CancelJobs => need(!self.jobs.active().is_empty(), "nothing is running"),
@@ -344,6 +353,11 @@ impl Editor {
             }
             Action::ShowTool => self.show_page(Page::Tool),
             Action::ShowPatches => self.show_page(Page::Patches),
+            Action::ShowDefects => self.show_page(Page::Defects),
+            Action::FindDefects => self.find_defects(),
+            Action::NextDefect => self.step_defect(1),
+            Action::PreviousDefect => self.step_defect(-1),
+            Action::FixDefect => self.fix_defect(),
             Action::ShowHistory => self.show_page(Page::History),
             Action::ShowJobs => self.show_page(Page::Jobs),
             Action::ShowReport => self.show_page(Page::Report),

@@ -5,6 +5,7 @@ use egui::{Frame, Margin, Panel, RichText, ScrollArea, Ui, vec2};
 use super::editor::{Editor, Page};
 use super::theme;
 
+pub mod defects;
 mod history;
 mod jobs;
 mod outliner;
@@ -33,6 +34,7 @@ pub fn right(ui: &mut Ui, editor: &mut Editor) {
         ScrollArea::vertical().id_salt(editor.page as usize).auto_shrink(false).show(ui, |ui| match editor.page {
             Page::Tool => editor.tool_panel(ui),
             Page::Patches => patches::show(ui, editor),
+            Page::Defects => defects::show(ui, editor),
             Page::History => history::show(ui, editor),
             Page::Jobs => jobs::show(ui, editor),
             Page::Report => report::show(ui, editor),

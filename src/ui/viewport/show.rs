@@ -53,6 +53,7 @@ impl Editor {
         self.viewport.section_handle(ui, pointer.pixel);
         self.viewport.anchor_mark(ui);
         self.tool_labels(ui, &pointer);
+        self.defect_marks(ui);
         self.linked_mark(ui);
         self.name_tag(ui, &pointer);
         self.viewport.triad(ui);
