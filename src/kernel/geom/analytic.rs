@@ -257,6 +257,8 @@ pub fn offset(surface: &Surface, distance: f64) -> Result<(Surface, f64), SweepE
         let mut split = [vec![false; lines[0].len() - 1], vec![false; lines[1].len() - 1]];
         for i in 0..lines[0].len() - 1 {
             for j in 0..lines[1].len() - 1 {
+                // The middle of a cell splits both ways only where neither of its sides was off.
+                let mut sides_off = false;
                 for (s, t) in [(0.5, 0.0), (0.0, 0.5), (0.5, 0.5)] {
                     let uv = DVec2::new(
                         lines[0][i] + s * (lines[0][i + 1] - lines[0][i]),
@@ -264,9 +266,10 @@ pub fn offset(surface: &Surface, distance: f64) -> Result<(Surface, f64), SweepE
                     );
                     let off = made.eval(uv).distance(at(uv));
                     worst = worst.max(off);
-                    if off > tol {
+                    if off > tol && !(sides_off && s == t) {
                         split[0][i] |= s > 0.0;
                         split[1][j] |= t > 0.0;
+                        sides_off = true;
                     }
                 }
             }

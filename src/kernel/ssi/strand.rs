@@ -159,10 +159,15 @@ impl Ground {
             for k in 0..strand.knots.len() {
                 let knot = strand.knots[k];
                 let chord = parabola(&line, knot.t, closed);
+                // Where a strand ends in a corner the parabola leans to the shorter of the two chords there.
+                let last = strand.knots.len() - 1;
+                let own = strand.knots[(k + 1).min(last)].p - strand.knots[if k == last { k - 1 } else { k }].p;
+                let own = if k == 0 || k == last { own.normalize_or_zero() } else { chord };
                 let crossed = self.cross(strand.pieces, &knot);
-                let (tangent, crossing) = match crossed {
-                    Some(n) if n.dot(chord).abs() > 0.3 => (n * n.dot(chord).signum(), true),
-                    _ => (chord, false),
+                let along = |n: DVec3| [chord, own].into_iter().map(|d| n.dot(d)).find(|d| d.abs() > 0.3);
+                let (tangent, crossing) = match crossed.and_then(|n| Some((n, along(n)?))) {
+                    Some((n, sign)) => (n * sign.signum(), true),
+                    None => (chord, false),
                 };
                 let knot = self.directed(strand.pieces, knot, tangent, crossing);
                 strand.knots[k] = knot;
