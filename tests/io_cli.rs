@@ -19,7 +19,7 @@ fn model(folder: &Path, with_unread: bool) {
     file.add(128, square(0.5));
     file.add(110, "0.,0.,0.,3.,4.,0.");
     if with_unread {
-        file.add(140, "0.,0.,1.,0.1,1");
+        file.add(154, "1.,2.,0.,0.,0.,0.,0.,1.");
     }
     std::fs::write(folder.join("model.igs"), file.text()).unwrap();
 }
@@ -36,7 +36,7 @@ fn info_tells_what_is_there() {
     assert_eq!(info["entities"][0]["degree"], serde_json::json!([1, 1]));
     assert_eq!(info["import"]["lines"][0]["severity"], "skipped");
     let text = String::from_utf8(output.stderr).unwrap();
-    assert!(text.contains("1 surfaces, 1 curves") && text.contains("offset surface"), "{text}");
+    assert!(text.contains("1 surfaces, 1 curves") && text.contains("solid"), "{text}");
 }
 
 #[test]
@@ -63,7 +63,7 @@ fn failures_have_their_codes_and_messages() {
         (vec!["info", "none.igs"], 1, "none.igs"),
         (vec!["info"], 2, "FILE"),
         (vec!["info", "model.igs", "--threads", "0"], 2, "threads"),
-        (vec!["convert", "model.igs", "out.xyz"], 1, "extension"),
+        (vec!["convert", "model.igs", "out.abc"], 1, "extension"),
         (vec!["convert", "model.igs", "no/such/folder.igs"], 1, "folder that exists"),
         (vec!["frobnicate", "--hard"], 2, "--hard"),
     ] {

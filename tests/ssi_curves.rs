@@ -357,7 +357,13 @@ fn curves_are_written_with_their_surfaces_and_read_back() {
     let (a, b) = list.split_at(4);
     let result = intersect(a, b, &SsiOptions::default(), &Job::new()).unwrap();
     let traces = traces_of(&result, &document, result.tol);
-    assert!(traces.notes.is_empty() && traces.bound <= result.tol);
+    assert!(
+        traces.notes.is_empty() && traces.bound <= result.tol,
+        "{:?} {:e} {:e}",
+        traces.notes,
+        traces.bound,
+        result.tol
+    );
     for trace in &traces.traces {
         let surface = document.get(trace.surface).unwrap().surface().unwrap();
         let [t0, t1] = trace.space.domain();
@@ -375,7 +381,10 @@ fn curves_are_written_with_their_surfaces_and_read_back() {
     let output = Command::new(&python).args(["-c", SCRIPT]).arg(&path).output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
     let lengths: Vec<f64> = text.lines().filter_map(|l| l.parse().ok()).collect();
-    assert!(lengths.iter().any(|l| (l - length).abs() < 1e-5), "{lengths:?}, ours {length}");
+    // It cuts a curve at its corners.
+    let run = |k: usize| (k..lengths.len()).map(|end| lengths[k..=end].iter().sum::<f64>()).collect::<Vec<_>>();
+    let whole = (0..lengths.len()).flat_map(run).any(|l| (l - length).abs() < 1e-5);
+    assert!(whole, "{lengths:?}, ours {length}");
     println!("OpenCASCADE sees {} free curves", lengths.len());
 }
 

@@ -161,7 +161,7 @@ fn graphs(report: &mut Report, seed: u64, n: usize) {
     }
     let wanted = Expected { open: counts.0, closed: counts.1, ..Expected::default() };
     let motion = random.motion();
-    let map = if seed % 2 == 0 { motion } else { DAffine3::IDENTITY };
+    let map = if seed.is_multiple_of(2) { motion } else { DAffine3::IDENTITY };
     report.check(&format!("graph {n}x{n} seed {seed}"), &[a.transformed(&map)], &[b.transformed(&map)], &wanted);
 }
 
@@ -250,7 +250,7 @@ fn loop_and_branch(report: &mut Report, seed: u64, radius: f64) {
             .sum::<f64>()
     };
     let shared2 = shared.clone();
-    let a = graph(3, move |x, y| shared(x, y));
+    let a = graph(3, shared);
     let b = turned_graph(1.7, 0.7 * random.next(), move |x, y| {
         let p = DVec2::new(x, y);
         shared2(x, y) + 0.5 * ((p - center).length_squared() - radius * radius) * line(p)
@@ -286,7 +286,7 @@ fn saddle(report: &mut Report, seed: u64, gap: f64) {
             .sum::<f64>()
     };
     let shared2 = shared.clone();
-    let a = graph(3, move |x, y| shared(x, y));
+    let a = graph(3, shared);
     let b = turned_graph(1.6, random.next(), move |x, y| shared2(x, y) - difference(x, y));
     let mut wanted = Expected::default();
     if gap == 0.0 {
@@ -435,11 +435,21 @@ fn overlap(report: &mut Report, seed: u64) {
     let wanted = Expected { regions: 1, ..Expected::default() };
     let a = part([-1.0, x], [-1.0, y]);
     let b = part([x - 0.7, 1.0], [y - 0.9, 1.0]);
-    report.check(&format!("overlapping corners, seed {seed}"), &[a.clone()], &[b.clone()], &wanted);
+    report.check(
+        &format!("overlapping corners, seed {seed}"),
+        std::slice::from_ref(&a),
+        std::slice::from_ref(&b),
+        &wanted,
+    );
     let b = b.swapped().reversed(Direction::U).elevated(Direction::V).unwrap();
-    report.check(&format!("overlapping corners, rewritten, seed {seed}"), &[a.clone()], &[b], &wanted);
+    report.check(&format!("overlapping corners, rewritten, seed {seed}"), std::slice::from_ref(&a), &[b], &wanted);
     let inner = part([-0.5, x - 0.6], [-0.6, y - 0.5]).reversed(Direction::V);
-    report.check(&format!("a part inside, seed {seed}"), &[a.clone()], &[inner.clone()], &wanted);
+    report.check(
+        &format!("a part inside, seed {seed}"),
+        std::slice::from_ref(&a),
+        std::slice::from_ref(&inner),
+        &wanted,
+    );
     report.check(&format!("a part around, seed {seed}"), &[inner], &[a], &wanted);
 }
 

@@ -64,7 +64,7 @@ fn a_square_with_a_round_hole_by_curves_in_space_or_in_parameters() {
     for (space, parameter) in [(true, true), (true, false), (false, true)] {
         let mut file = File::default();
         let s = part(&mut file, 128, square(0.0));
-        let mut boundary = |file: &mut File, make: &dyn Fn(&mut File) -> usize| {
+        let boundary = |file: &mut File, make: &dyn Fn(&mut File) -> usize| {
             // On this square a point and its parameters are the same numbers.
             let b = if parameter { make(file) } else { 0 };
             let c = if space { make(file) } else { 0 };
@@ -120,7 +120,7 @@ fn drum() -> File {
     let v = vertices;
     let edges =
         part(&mut file, 504, format!("3,{},{v},1,{v},1,{},{v},2,{v},2,{seam},{v},1,{v},2", circles[0], circles[1]));
-    let mut ring = |f: &mut File, uses: &[(usize, usize)]| {
+    let ring = |f: &mut File, uses: &[(usize, usize)]| {
         let list: Vec<String> = uses.iter().map(|(k, o)| format!("0,{edges},{k},{o},0")).collect();
         part(f, 508, format!("{},{}", uses.len(), list.join(",")))
     };

@@ -249,17 +249,16 @@ fn counted(pairs: &[[Arc<Surface>; 2]], kind: VolumeKind, height: u32) -> Result
     for [a, b] in pairs {
         let options = options(height, Instructions::Best);
         let mut overlap = Overlap::default();
-        let spent;
-        if kind == VolumeKind::Rss {
+        let spent = if kind == VolumeKind::Rss {
             let built = trees(&[a, b], &options);
             build(&built, false);
             let [ta, tb] = &built[..] else { continue };
-            spent = together(1, || overlap = walk(ta, tb, None, false));
+            together(1, || overlap = walk(ta, tb, None, false))
         } else {
             let tree = |s| VolumeTree::build(s, &options, kind, &Job::new());
             let (ta, tb) = (tree(a)?, tree(b)?);
-            spent = together(1, || overlap = ta.overlap(&tb, None, 0.0, &Job::new()));
-        }
+            together(1, || overlap = ta.overlap(&tb, None, 0.0, &Job::new()))
+        };
         count += overlap.pairs.len();
         time += spent.as_secs_f64();
     }

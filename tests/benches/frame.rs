@@ -48,7 +48,7 @@ fn scene(n: usize) -> Scene {
         let mut scene = Scene::default();
         scene.sync(&document);
         for item in scene.items().to_vec() {
-            scene.accept(Request { id: item.id(), geometry: item.geometry.clone(), chord_tol }.run());
+            scene.accept(Request { id: item.id(), geometry: item.geometry.clone(), chord_tol, quick: None }.run());
         }
         if scene.counts().0 >= 1_000_000 {
             return scene;
