@@ -221,6 +221,11 @@ fn the_healed_crossing_of_a_real_model_is_meshed_across_its_patches() {
     healed("pocc_surf114.igs", "tests/data/pocc_crossing.heal.ron");
 }
 
+#[test]
+fn a_healed_region_of_an_airliner_is_one_shell_and_meshed_across_its_patches() {
+    healed("afem_777.stp", "tests/data/afem_fuselage.heal.ron");
+}
+
 /// The sum of the areas of the faces of a file, and their number, as OpenCASCADE has them.
 const AREA: &str = "
 import sys, gmsh
