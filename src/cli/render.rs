@@ -312,8 +312,9 @@ fn fill(camera: &mut Camera, viewport: Viewport, scene: &Scene, bounds: &Aabb, f
         .filter_map(|item| item.display.as_ref())
         .flat_map(|d| d.curves.iter().flat_map(|c| &c.points).chain(&d.mesh.points))
         .collect();
-    // Coming closer changes the perspective, which changes what fills the picture; it settles quickly.
-    for _ in 0..4 {
+    // Coming closer changes the perspective, which changes what fills the picture. Half steps (in powers) settle for
+    // models that are deep along the line of sight too, where whole ones would overshoot.
+    for _ in 0..16 {
         let view = View::new(camera, viewport, bounds);
         let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
         for at in points.iter().filter_map(|p| view.project(**p)) {
@@ -327,7 +328,7 @@ fn fill(camera: &mut Camera, viewport: Viewport, scene: &Scene, bounds: &Aabb, f
         let part = ((high - low) / (MARGIN * size)).max_element();
         camera.pan(viewport, camera.distance, 0.5 * (low + high), viewport.center());
         if part > 1e-6 {
-            camera.distance *= part;
+            camera.distance *= part.sqrt();
         }
     }
 }
@@ -383,6 +384,38 @@ fn save(picture: &image::RgbaImage, path: &Path) -> Result<(), CliError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A car part that is long along the line of sight stood as a dot in its picture.
+    #[test]
+    fn a_model_that_is_deep_along_the_line_of_sight_fills_its_picture() {
+        let mut camera = Camera::default();
+        let viewport = Viewport::new(700.0, 500.0);
+        let view = View::new(&camera, viewport, &Aabb::of([glam::DVec3::ZERO, glam::DVec3::ONE]));
+        let ray = view.ray(viewport.center());
+        let (along, across) = (ray.direction.normalize(), ray.direction.any_orthonormal_vector());
+        let corner = |x: f64, y: f64| 100.0 * along * x + 20.0 * across * y + 500.0 * glam::DVec3::X;
+        let corners = [corner(0.0, 0.0), corner(1.0, 0.0), corner(0.0, 1.0), corner(1.0, 1.0)];
+        let strip = crate::kernel::geom::Surface::bilinear(corners).unwrap();
+        let mut document = Document::new(crate::model::document::Unit::Millimetre);
+        document.add("strip", crate::model::document::Shape::Surface(Arc::new(strip)), None);
+        let mut scene = Scene::default();
+        scene.sync(&document);
+        for _ in 0..2 {
+            let bounds = scene.bounds();
+            camera.frame(&bounds, viewport);
+            fill(&mut camera, viewport, &scene, &bounds, |_| true);
+            scene.refine(&View::new(&camera, viewport, &scene.bounds()));
+        }
+        let view = View::new(&camera, viewport, &scene.bounds());
+        let size = DVec2::new(viewport.width, viewport.height);
+        let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+        for p in &scene.items()[0].display.as_ref().unwrap().mesh.points {
+            let at = view.project(*p).unwrap().pixel / size;
+            (low, high) = (low.min(at), high.max(at));
+        }
+        let part = (high - low).max_element();
+        assert!(low.min_element() > 0.0 && high.max_element() < 1.0 && part > 0.7, "{low} {high}");
+    }
 
     #[test]
     fn sizes_and_turns_are_read_or_refused() {
