@@ -314,7 +314,7 @@ fn fill(camera: &mut Camera, viewport: Viewport, scene: &Scene, bounds: &Aabb, f
         .collect();
     // Coming closer changes the perspective, which changes what fills the picture. Half steps (in powers) settle for
     // models that are deep along the line of sight too, where whole ones would overshoot.
-    for _ in 0..16 {
+    for _ in 0..24 {
         let view = View::new(camera, viewport, bounds);
         let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
         for at in points.iter().filter_map(|p| view.project(**p)) {
@@ -326,7 +326,8 @@ fn fill(camera: &mut Camera, viewport: Viewport, scene: &Scene, bounds: &Aabb, f
         }
         let size = DVec2::new(viewport.width, viewport.height);
         let part = ((high - low) / (MARGIN * size)).max_element();
-        camera.pan(viewport, camera.distance, 0.5 * (low + high), viewport.center());
+        let middle = viewport.center().lerp(0.5 * (low + high), 0.5);
+        camera.pan(viewport, camera.distance, middle, viewport.center());
         if part > 1e-6 {
             camera.distance *= part.sqrt();
         }
