@@ -129,13 +129,8 @@ fn ascii(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii() && !c.is_ascii_control() { c } else { '?' }).collect()
 }
 
-fn is_clamped(knots: &Knots) -> bool {
-    let (p, v) = (knots.degree(), knots.values());
-    v[..=p].iter().all(|&k| k == v[0]) && v[v.len() - p - 1..].iter().all(|&k| k == v[v.len() - 1])
-}
-
 fn surface_record(surface: &Surface) -> Record {
-    let clamped = surface.knots().iter().all(is_clamped);
+    let clamped = surface.knots().iter().all(Knots::is_clamped);
     let [u, v] = surface.domain();
     // A restriction to the whole domain clamps the knots; it cannot fail, and if it did the knots would be kept.
     let refined = if clamped { None } else { surface.restricted(u, v).ok() };
@@ -160,7 +155,7 @@ fn surface_record(surface: &Surface) -> Record {
 
 fn curve_record(curve: &Curve) -> Record {
     let [start, end] = curve.domain();
-    let refined = if is_clamped(curve.knots()) { None } else { curve.restricted(start, end).ok() };
+    let refined = if curve.knots().is_clamped() { None } else { curve.restricted(start, end).ok() };
     let curve = refined.as_ref().unwrap_or(curve);
     let points = curve.points();
     let mut record = Record::new(126);
