@@ -88,6 +88,8 @@ pub struct PatchSession {
     pub snaps: [bool; 5],
     /// Changes whenever something to draw does.
     pub revision: u64,
+    /// The revision of the document that was drawn last.
+    document: u64,
     /// What the cursor snaps to.
     pub snap: Option<Snap>,
     /// The end of a piece that is being dragged: side, piece, end.
@@ -114,6 +116,7 @@ impl PatchSession {
             show_slab: false,
             snaps: [true; 5],
             revision: 1,
+            document: 0,
             snap: None,
             trimming: None,
             hover: None,
@@ -125,6 +128,14 @@ impl PatchSession {
     /// The edges of the model, once they are known.
     pub fn edges(&self) -> Option<&Edges> {
         self.edges.value().map(Arc::as_ref)
+    }
+
+    /// Has everything drawn anew after a change of the document: what is hidden may have changed.
+    pub fn follow(&mut self, document: u64) {
+        if self.document != document {
+            self.document = document;
+            self.revision += 1;
+        }
     }
 
     /// How to snap.

@@ -19,7 +19,7 @@ use crate::view::colormap;
 use crate::view::feature_edges::{EdgeKind, EdgePiece, LinePattern};
 use crate::view::patch_tool::{Mode, Stage};
 use crate::view::pick::{PickHit, Target};
-use crate::view::scene::Scene;
+use crate::view::scene::{Item, Scene};
 
 /// The number under which the tool's own things are kept on the graphics card.
 const OWN: u64 = u64::MAX;
@@ -129,7 +129,9 @@ impl PatchSession {
     fn candidates(&self, d: &mut Sketch, scene: &Scene) {
         let Some(edges) = self.edges() else { return };
         for kind in EdgeKind::ALL {
-            let pieces = edges.pieces.iter().filter(|p| p.kind == kind);
+            // What the user has hidden meanwhile goes with its edges.
+            let shown = |p: &&EdgePiece| scene.curve_item(&p.curve).is_some_and(Item::visible);
+            let pieces = edges.pieces.iter().filter(|p| p.kind == kind).filter(shown);
             let lines = pieces.map(|piece| stretch(scene, piece)).filter(|points| points.len() > 1);
             let ([r, g, b], pattern) = kind.style();
             let [r, g, b] = colormap::linear([r, g, b]);

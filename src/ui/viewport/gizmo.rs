@@ -134,6 +134,12 @@ impl Viewport {
         }
     }
 
+    /// Whether a place of the window belongs to the axes in the corner.
+    pub fn on_triad(&self, at: Pos2) -> bool {
+        let center = self.rect.left_bottom() + vec2(TRIAD.0, -TRIAD.0);
+        at.distance(center) < TRIAD.1 + 10.0
+    }
+
     /// Whether the handle of the section plane is under a pixel.
     pub fn on_section_handle(&self, pixel: DVec2) -> bool {
         let at = self.section.and_then(|plane| self.view().project(plane.point()));

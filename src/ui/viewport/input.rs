@@ -150,7 +150,7 @@ impl Viewport {
     fn left_button(&mut self, ui: &Ui, response: &Response, out: &mut Pointer, at: egui::Pos2) -> bool {
         let (pressed, released, down, now) =
             ui.input(|i| (i.pointer.primary_pressed(), i.pointer.primary_released(), i.pointer.primary_down(), i.time));
-        if pressed && response.contains_pointer() {
+        if pressed && response.contains_pointer() && !self.on_triad(at) {
             (self.pressed, self.hold_from) = (Some(at), Some(now));
         }
         let Some(start) = self.pressed else { return false };

@@ -31,6 +31,12 @@ impl SideLine {
         self.points.windows(2).map(|p| p[0].distance(p[1])).sum()
     }
 
+    /// How far along it the place nearest to a point is.
+    pub fn along(&self, p: DVec3) -> f64 {
+        let (k, _, foot) = super::piece::nearest_on_at(&self.points, p);
+        self.points[..=k].windows(2).map(|p| p[0].distance(p[1])).sum::<f64>() + self.points[k].distance(foot)
+    }
+
     /// `n` points at equal distances along it, run backwards when `reversed`.
     pub fn resampled(&self, n: usize, reversed: bool) -> Vec<DVec3> {
         let mut out = resample(&self.points, n);

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::arrange::{Order, SideLine};
+use super::meetings::{Cut, meetings};
 use super::piece::{Picked, PieceError};
 use crate::view::scene::Scene;
 
@@ -85,8 +86,14 @@ impl Corner {
 /// A fix that was chosen, for the corner between two sides.
 pub type Chosen = ([usize; 2], CornerFix);
 
-/// The four corners of a loop.
-pub fn corners(order: &Order, lines: &[Option<SideLine>; 4], tol: f64, chosen: &[Chosen]) -> Vec<Corner> {
+/// The four corners of a loop. `cut`: how the loop closes when its sides are cut.
+pub(super) fn corners(
+    order: &Order,
+    lines: &[Option<SideLine>; 4],
+    cut: Option<&Cut>,
+    tol: f64,
+    chosen: &[Chosen],
+) -> Vec<Corner> {
     let end = |place: usize, end: usize| {
         let line = lines[order.sides[place]].as_ref();
         line.map_or(DVec3::NAN, |l| l.ends()[end ^ usize::from(order.reversed[place])])
@@ -102,8 +109,9 @@ pub fn corners(order: &Order, lines: &[Option<SideLine>; 4], tol: f64, chosen: &
             let (state, crossing) = match (gap <= tol, fix) {
                 (true, _) => (CornerState::Closed, None),
                 (false, fix) => {
-                    let crossing = match (&lines[sides[0]], &lines[sides[1]]) {
-                        (Some(a), Some(b)) => crossing(&a.points, &b.points, tol),
+                    let crossing = match (&lines[sides[0]], &lines[sides[1]], cut) {
+                        (_, Some(line), Some(cut)) => Some(cut.ends(sides[1], line)[usize::from(order.reversed[k])]),
+                        (Some(a), Some(b), None) => meetings(&a.points, &b.points, tol).first().map(|m| m.point),
                         _ => None,
                     };
                     (fix.map_or(CornerState::Open, CornerState::ClosedBy), crossing)
@@ -118,67 +126,32 @@ pub(super) fn same_pair(a: [usize; 2], b: [usize; 2]) -> bool {
     a == b || a == [b[1], b[0]]
 }
 
-/// Where two polylines come nearest to each other, when that is within the tolerance.
-pub(super) fn crossing(a: &[DVec3], b: &[DVec3], tol: f64) -> Option<DVec3> {
-    let mut best = (tol * tol, None);
-    for s in a.windows(2) {
-        for t in b.windows(2) {
-            let reach = s[0].distance(s[1]) + t[0].distance(t[1]) + tol;
-            if s[0].distance_squared(t[0]) > reach * reach {
-                continue;
-            }
-            let (p, q) = nearest_of_segments(s, t);
-            let d = p.distance_squared(q);
-            if d <= best.0 {
-                best = (d, Some(0.5 * (p + q)));
-            }
-        }
-    }
-    best.1
-}
-
-/// The nearest points of two segments: the inner solution where it is inside both, else the best of the four ends.
-fn nearest_of_segments(s: &[DVec3], t: &[DVec3]) -> (DVec3, DVec3) {
-    let (d, e, r) = (s[1] - s[0], t[1] - t[0], s[0] - t[0]);
-    let (a, b, c) = (d.length_squared(), d.dot(e), e.length_squared());
-    let det = a * c - b * b;
-    if det > 1e-14 * a * c {
-        let (u, v) = ((b * e.dot(r) - c * d.dot(r)) / det, (a * e.dot(r) - b * d.dot(r)) / det);
-        if (0.0..=1.0).contains(&u) && (0.0..=1.0).contains(&v) {
-            return (s[0] + d * u, t[0] + e * v);
-        }
-    }
-    let foot = |p: DVec3, q: &[DVec3]| {
-        let d = q[1] - q[0];
-        let x = ((p - q[0]).dot(d) / d.length_squared()).clamp(0.0, 1.0);
-        if x.is_finite() { q[0] + d * x } else { q[0] }
+/// A side's pieces cut at a point of it. The part towards `keep` stays; without that the piece that is cut keeps the
+/// part that was clicked (the longer part of a segment or polyline). Pieces beyond the cut go.
+pub(super) fn trim_at(
+    scene: &Scene,
+    pieces: &[Picked],
+    line: &SideLine,
+    at: DVec3,
+    keep: Option<DVec3>,
+) -> Result<Vec<Picked>, PieceError> {
+    let place_of = |p: DVec3| {
+        let far = |k: usize| pieces[line.chain[k].0].distance(p);
+        (0..line.chain.len()).min_by(|&a, &b| far(a).total_cmp(&far(b))).unwrap_or(0)
     };
-    let pairs = [(s[0], foot(s[0], t)), (s[1], foot(s[1], t)), (foot(t[0], s), t[0]), (foot(t[1], s), t[1])];
-    let mut best = pairs[0];
-    for pair in pairs {
-        if pair.0.distance_squared(pair.1) < best.0.distance_squared(best.1) {
-            best = pair;
-        }
-    }
-    best
-}
-
-/// A side's pieces cut at a point of it. The piece that is cut keeps the part that was clicked (the longer part of a
-/// segment or polyline); pieces beyond the cut go.
-pub(super) fn trim_at(scene: &Scene, pieces: &[Picked], line: &SideLine, at: DVec3) -> Result<Vec<Picked>, PieceError> {
-    let place = (0..line.chain.len())
-        .min_by(|&a, &b| {
-            let far = |k: usize| pieces[line.chain[k].0].distance(at);
-            far(a).total_cmp(&far(b))
-        })
-        .unwrap_or(0);
+    let place = place_of(at);
     let (index, backwards) = line.chain[place];
     let piece = &pieces[index];
     // Which end of the piece's own direction goes.
-    let end = match piece.source {
-        super::piece::Source::Curve { clicked, .. } => {
+    let end = match (&piece.source, keep.map(|p| (place_of(p), p))) {
+        (_, Some((other, _))) if other != place => usize::from((other > place) == backwards),
+        (_, Some((_, p))) => {
+            let [a, b] = piece.split(scene, at)?;
+            usize::from(a.distance(p) < b.distance(p))
+        }
+        (super::piece::Source::Curve { clicked, .. }, None) => {
             let t = piece.nearest_parameter(scene, at).ok_or(PieceError::Gone)?;
-            usize::from(t > clicked)
+            usize::from(t > *clicked)
         }
         _ => {
             let [a, b] = piece.split(scene, at)?;
@@ -199,19 +172,4 @@ pub(super) fn trim_at(scene: &Scene, pieces: &[Picked], line: &SideLine, at: DVe
     out.push((index, cut));
     out.sort_by_key(|(k, _)| *k);
     Ok(out.into_iter().map(|(_, piece)| piece).collect())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn crossings_are_where_lines_cross() {
-        let a = [DVec3::ZERO, DVec3::X * 2.0];
-        let b = [DVec3::new(0.5, -1.0, 1e-4), DVec3::new(0.5, 1.0, 1e-4)];
-        assert!(crossing(&a, &b, 1e-3).unwrap().distance(DVec3::new(0.5, 0.0, 5e-5)) < 1e-12);
-        assert_eq!(crossing(&a, &b, 1e-5), None);
-        // Parallel lines within the tolerance touch somewhere; far apart they do not.
-        assert_eq!(crossing(&a, &[DVec3::Y, DVec3::Y + DVec3::X], 0.5), None);
-    }
 }

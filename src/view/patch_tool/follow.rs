@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::arrange::{self, SideLine};
 use super::corners::trim_at;
+use super::meetings::meetings;
 use super::piece::{Picked, PieceError};
 use super::{PatchTool, Stage, sentence};
 use crate::view::display::CurveRef;
@@ -33,13 +34,14 @@ impl PatchTool {
     }
 
     pub(super) fn trim_side(&mut self, side: usize, at: DVec3, scene: &Scene) -> bool {
+        let keep = self.cut.as_ref().zip(self.lines[side].as_ref()).map(|(cut, line)| cut.middle(side, line));
         if self.sides[side].shared {
             self.refuse_shared(side);
             return false;
         }
         let pieces = &self.sides[side].pieces;
         let Some(line) = arrange::chain(pieces) else { return false };
-        match trim_at(scene, pieces, &line, at) {
+        match trim_at(scene, pieces, &line, at, keep) {
             Ok(trimmed) => {
                 self.touch(side);
                 self.sides[side].pieces = trimmed;
@@ -61,11 +63,15 @@ impl PatchTool {
         let tol = self.options.joining_tol;
         let mut cuts: Vec<(usize, DVec3)> = Vec::new();
         for a in 0..4 {
+            if let (Some(cut), Some(line)) = (&self.cut, &self.lines[a]) {
+                cuts.extend(cut.ends(a, line).map(|at| (a, at)));
+                continue;
+            }
             for b in a + 1..4 {
                 if let (Some(p), Some(q)) = (&self.lines[a], &self.lines[b])
-                    && let Some(at) = super::corners::crossing(&p.points, &q.points, tol)
+                    && let Some(meeting) = meetings(&p.points, &q.points, tol).first()
                 {
-                    cuts.extend([(a, at), (b, at)]);
+                    cuts.extend([(a, meeting.point), (b, meeting.point)]);
                 }
             }
         }

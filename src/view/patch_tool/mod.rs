@@ -14,6 +14,7 @@ mod actions;
 pub mod arrange;
 pub mod corners;
 mod follow;
+mod meetings;
 mod picks;
 pub mod piece;
 pub mod preview;
@@ -40,6 +41,7 @@ use crate::model::document::{EntityId, Patch, Unit};
 use crate::model::spec::{BoundaryMode, HealSpec, PatchSpec};
 use arrange::{Layout, Order, SideLine};
 use corners::{Chosen, Corner, CornerFix};
+use meetings::Cut;
 use piece::Picked;
 use preview::Preview;
 
@@ -325,6 +327,8 @@ pub struct PatchTool {
     // Made from the above after every event.
     lines: [Option<SideLine>; 4],
     layout: Layout,
+    /// How the loop closes when its sides are cut where they meet; none where their ends meet.
+    cut: Option<Cut>,
     corners: Vec<Corner>,
     preview: Option<Preview>,
 }
@@ -352,6 +356,7 @@ impl PatchTool {
             edges: Arc::default(),
             lines: [None, None, None, None],
             layout: Layout::Nothing,
+            cut: None,
             corners: Vec::new(),
             preview: None,
         }
@@ -514,17 +519,48 @@ impl PatchTool {
         if !self.is_ambiguous() {
             self.other_loop = false;
         }
-        self.corners = match self.order() {
-            Some(order) if self.is_loop() => {
-                corners::corners(order, &self.lines, self.options.joining_tol, &self.chosen)
-            }
-            _ => Vec::new(),
-        };
+        self.corners = self.corners_now();
+        self.cut = self.find_cut();
+        if let Some(cut) = &self.cut {
+            self.layout = Layout::Loop(cut.order.clone(), None);
+            self.corners = self.corners_now();
+        }
         let drawn = match (&self.layout, self.order()) {
             (Layout::Loop(..), Some(order)) => Layout::Loop(order.clone(), None),
             (layout, _) => layout.clone(),
         };
-        self.preview = preview::preview(&drawn, &self.lines, &self.corners);
+        self.preview = match &self.cut {
+            Some(cut) => {
+                let left = |side: usize, line: &SideLine| SideLine { points: cut.of(side, line), ..line.clone() };
+                let lines = [0, 1, 2, 3].map(|k: usize| self.lines[k].as_ref().map(|line| left(k, line)));
+                preview::preview(&drawn, &lines, &[])
+            }
+            None => preview::preview(&drawn, &self.lines, &self.corners),
+        };
+    }
+
+    fn corners_now(&self) -> Vec<Corner> {
+        match self.order() {
+            Some(order) if self.is_loop() => {
+                corners::corners(order, &self.lines, self.cut.as_ref(), self.options.joining_tol, &self.chosen)
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// How the sides close a loop when they are cut, where they do not close one as they are and nobody has said how.
+    fn find_cut(&self) -> Option<Cut> {
+        let tol = self.options.joining_tol;
+        let decided = self.other_loop || !self.chosen.is_empty() || self.sides.iter().any(|s| s.flipped);
+        if decided || self.corners.iter().all(|c| c.gap <= tol) {
+            return None;
+        }
+        let [Some(a), Some(b), Some(c), Some(d)] = &self.lines else { return None };
+        let lines = [a, b, c, d];
+        let clicked = [0, 1, 2, 3].map(|k: usize| {
+            self.sides[k].pieces.iter().filter_map(|p| Some(lines[k].along(p.clicked()?))).collect::<Vec<f64>>()
+        });
+        meetings::close_by_cutting(lines, &clicked, tol)
     }
 
     /// Whether all four sides have pieces.

@@ -26,6 +26,8 @@ pub enum Source {
         range: [f64; 2],
         /// Where it was clicked: trimming keeps the part with this parameter.
         clicked: f64,
+        /// The point there.
+        at: DVec3,
     },
     /// A straight segment.
     Line([DVec3; 2]),
@@ -91,7 +93,9 @@ impl Picked {
         if points.iter().all(|p| *p == points[0]) {
             return Err(PieceError::Point);
         }
-        Ok(Self { source: Source::Curve { curve, range, clicked: clicked.clamp(range[0], range[1]) }, points })
+        let clicked = clicked.clamp(range[0], range[1]);
+        let at = item.geometry.curve_jet(&curve, clicked).map_or(points[0], |jet| jet[0]);
+        Ok(Self { source: Source::Curve { curve, range, clicked, at }, points })
     }
 
     /// The straight segment between two points.
@@ -253,6 +257,14 @@ impl Picked {
         }
     }
 
+    /// Where it was clicked; nothing for points that the user set.
+    pub fn clicked(&self) -> Option<DVec3> {
+        match self.source {
+            Source::Curve { at, .. } => Some(at),
+            _ => None,
+        }
+    }
+
     /// Its end points.
     pub fn ends(&self) -> [DVec3; 2] {
         [self.points[0], self.points[self.points.len() - 1]]
@@ -286,7 +298,7 @@ impl Picked {
     /// The piece with one end (0 start, 1 end) moved along its curve to a parameter. Points of lines and polylines move
     /// freely by [`Picked::moved`].
     pub fn trimmed(&self, scene: &Scene, end: usize, t: f64) -> Result<Self, PieceError> {
-        let Source::Curve { curve, range, clicked } = self.source else { return Ok(self.clone()) };
+        let Source::Curve { curve, range, clicked, .. } = self.source else { return Ok(self.clone()) };
         let range = if end == 0 { [t, range[1]] } else { [range[0], t] };
         Self::of_curve(scene, curve, Some(range), clicked)
     }
@@ -422,7 +434,7 @@ pub(super) fn nearest_on(points: &[DVec3], p: DVec3) -> (DVec3, f64) {
     (foot, distance)
 }
 
-fn nearest_on_at(points: &[DVec3], p: DVec3) -> (usize, f64, DVec3) {
+pub(super) fn nearest_on_at(points: &[DVec3], p: DVec3) -> (usize, f64, DVec3) {
     let mut best = (0, f64::INFINITY, points[0]);
     for (k, pair) in points.windows(2).enumerate() {
         let d = pair[1] - pair[0];

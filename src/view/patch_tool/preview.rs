@@ -120,7 +120,8 @@ fn coons(sides: [Vec<DVec3>; 4], corners: [DVec3; 4]) -> Vec<DVec3> {
 
 /// Cells that face the other way. A surface may bend as far as it likes along one direction; what counts is whether a
 /// cell turns over against its neighbour (followed over the whole grid; the smaller part is the fold), and
-/// whether the direction of u turns back along v, or that of v along u, as it does in a twisted strip.
+/// whether the direction of u turns back along v, or that of v along u, as it does in a twisted strip. There it does so
+/// along most of the side; a side that winds around something turns back in places and folds nothing.
 fn folds(points: &[DVec3]) -> Vec<[usize; 2]> {
     let mut out = overturned(points);
     let at = |i: usize, j: usize| points[j * (CELLS + 1) + i];
@@ -128,13 +129,17 @@ fn folds(points: &[DVec3]) -> Vec<[usize; 2]> {
         let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1));
         [(b - a + d - c).normalize_or_zero(), (c - a + d - b).normalize_or_zero()]
     };
+    let turns = |[u, v]: [DVec3; 2], [u0, v0]: [DVec3; 2]| [u.dot(u0) < 0.0, v.dot(v0) < 0.0];
+    // A ring turns both directions alike; a twisted strip only the one across.
+    let across = |i: usize, j: usize| turns(step(i, j), step(i, 0)) == [true, false];
+    let along = |i: usize, j: usize| turns(step(i, j), step(0, j)) == [false, true];
+    let last = CELLS - 1;
+    let most = |turned: &dyn Fn(usize) -> bool| 2 * (0..CELLS).filter(|&k| turned(k)).count() > CELLS;
+    let twisted = [most(&|i| across(i, last)), most(&|j| along(last, j))];
     for j in 0..CELLS {
         for i in 0..CELLS {
-            let [u, v] = step(i, j);
-            let turns = |[u0, v0]: [DVec3; 2]| [u.dot(u0) < 0.0, v.dot(v0) < 0.0];
-            // A ring turns both directions alike; a twisted strip only the one across.
-            let twisted = turns(step(i, 0)) == [true, false] || turns(step(0, j)) == [false, true];
-            if twisted && !out.contains(&[i, j]) {
+            let here = (twisted[0] && across(i, j)) || (twisted[1] && along(i, j));
+            if here && !out.contains(&[i, j]) {
                 out.push([i, j]);
             }
         }
@@ -256,5 +261,27 @@ mod tests {
         assert_eq!(made.kind, PreviewKind::Ruled);
         assert!(made.folds.is_empty());
         assert_eq!(made.triangles().len(), 2 * CELLS * CELLS);
+    }
+
+    #[test]
+    fn two_hairpins_whose_bends_face_each_other_askew_do_not_fold() {
+        // The sections of a thick leaf: around its nose, which comes earlier along one side than along the other.
+        let hairpin = |lead: f64, z: f64| -> Vec<DVec3> {
+            let r = 0.3;
+            let mut points = vec![DVec3::new(-lead, r, z)];
+            let turn = |a: f64| DVec3::new(r * a.sin(), r * a.cos(), z);
+            points.extend((0..=32).map(|k| turn(f64::from(k) / 32.0 * std::f64::consts::PI)));
+            points.push(DVec3::new(-(2.0 - lead), -r, z));
+            points
+        };
+        let lines = [
+            chain(&[Picked::polyline(&hairpin(1.0, 0.0)).unwrap()]),
+            chain(&[Picked::polyline(&hairpin(1.35, 1.0)).unwrap()]),
+            None,
+            None,
+        ];
+        let ends = [0, 1, 2, 3].map(|k: usize| lines[k].as_ref().map(SideLine::ends));
+        let made = preview(&layout(&ends, [false; 4]), &lines, &[]).unwrap();
+        assert!(made.folds.is_empty(), "{:?}", made.folds);
     }
 }
