@@ -537,3 +537,62 @@ fn pictures_of_the_window() {
     let changed = empty.pixels().zip(healed.pixels()).filter(|(a, b)| a != b).count();
     assert!(changed > 10_000, "the deviation map shows: {changed} pixels changed");
 }
+
+/// The middle of a border, in the window.
+fn border_at(window: &Window, surface: usize, side: patchwright::kernel::geom::Side, f: f64) -> (Pos2, DVec3) {
+    let viewport = &window.state().editor.viewport;
+    let item = &viewport.scene.items()[surface];
+    let curve = item.geometry.surface().unwrap().border(side).unwrap();
+    let [start, end] = curve.domain();
+    let p = curve.eval(start + f * (end - start));
+    (viewport.project(p).unwrap(), p)
+}
+
+#[test]
+fn measuring_two_borders_gives_the_gap_that_dense_sampling_gives() {
+    use patchwright::kernel::geom::Side;
+    let mut window = opened("surfaces_with_gap.igs");
+    key(&mut window, Modifiers::NONE, Key::M);
+    assert_eq!(prompt(&window), "Measure · Click the first point, curve or surface");
+    // The two borders that should be one: found as the nearest pair.
+    let curves: Vec<_> = {
+        let items = window.state().editor.viewport.scene.items();
+        let border = |k: usize, side| items[k].geometry.surface().unwrap().border(side).unwrap();
+        let all = [Side::UMin, Side::UMax, Side::VMin, Side::VMax];
+        let pairs = all.into_iter().flat_map(|a| all.into_iter().map(move |b| (a, b)));
+        let middle = |c: &patchwright::kernel::geom::Curve| c.eval(0.5 * (c.domain()[0] + c.domain()[1]));
+        let apart = |&(a, b): &(Side, Side)| middle(&border(0, a)).distance(middle(&border(1, b)));
+        let (a, b) = pairs.min_by(|x, y| apart(x).total_cmp(&apart(y))).unwrap();
+        vec![(0, a, border(0, a)), (1, b, border(1, b))]
+    };
+    for (k, (surface, side, _)) in curves.iter().enumerate() {
+        let (at, _) = border_at(&window, *surface, *side, if k == 0 { 0.37 } else { 0.61 });
+        click(&mut window, at);
+    }
+    let Tool::Measure(session) = &window.state().editor.tool else { panic!() };
+    let found = session.found().unwrap().clone();
+    let [least, largest] = found.gap.expect("two curves were clicked").map(|s| s.length());
+    let sampled = |a: &patchwright::kernel::geom::Curve, b: &patchwright::kernel::geom::Curve| {
+        let at = |c: &patchwright::kernel::geom::Curve, k: usize| {
+            let [start, end] = c.domain();
+            c.eval(start + (end - start) * k as f64 / 400.0)
+        };
+        (0..=400)
+            .map(|i| (0..=400).map(|j| at(a, i).distance(at(b, j))).fold(f64::INFINITY, f64::min))
+            .collect::<Vec<_>>()
+    };
+    let all: Vec<f64> =
+        sampled(&curves[0].2, &curves[1].2).into_iter().chain(sampled(&curves[1].2, &curves[0].2)).collect();
+    let (low, high) = all.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), d| (l.min(*d), h.max(*d)));
+    let step = 2e-2 * high;
+    assert!(least <= low + 1e-12 && least >= low - step, "{least} against {low}");
+    assert!((largest - high).abs() <= step, "{largest} against {high}");
+    picture(&mut window, "editor_measured");
+    // Backspace takes the second place back, Esc the first, Esc again the tool.
+    key(&mut window, Modifiers::NONE, Key::Backspace);
+    assert_eq!(prompt(&window), "Measure · Click the second point, curve or surface");
+    key(&mut window, Modifiers::NONE, Key::Escape);
+    assert_eq!(prompt(&window), "Measure · Click the first point, curve or surface");
+    key(&mut window, Modifiers::NONE, Key::Escape);
+    assert!(prompt(&window).starts_with("Select"), "{}", prompt(&window));
+}

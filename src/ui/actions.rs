@@ -57,6 +57,10 @@ pub enum Action {
     PatchTool,
     AdjustPatch,
     Inspect,
+    /// Measure between two places.
+    MeasureTool,
+    /// Stripes that show breaks of tangent and curvature.
+    Zebra,
     IntersectTool,
     IntersectVisible,
     SelfIntersectTool,
@@ -273,6 +277,14 @@ pub const ACTIONS: &[Info] = &[
     with(Icon::Edges, entry(Action::Edges, View, 3, "Edges", key(ALT, Key::E), "Draw the edges of the surfaces")),
     with(Icon::Iso, entry(Action::IsoLines, View, 3, "Iso-lines", key(ALT, Key::I), "Draw lines of constant u and v")),
     entry(
+        Action::Zebra,
+        View,
+        3,
+        "Zebra stripes",
+        key(ALT, Key::Z),
+        "Reflect stripes: they break where surfaces meet at an angle and kink where the curvature jumps",
+    ),
+    entry(
         Action::WholeSurfaces,
         View,
         3,
@@ -414,6 +426,17 @@ pub const ACTIONS: &[Info] = &[
         None,
         "Look through every visible surface in the background",
     ),
+    with(
+        Icon::Measure,
+        entry(
+            Action::MeasureTool,
+            Analyse,
+            0,
+            "Measure",
+            key(NONE, Key::M),
+            "Measure between two places: distance, distance from a surface, gap between two curves, angle",
+        ),
+    ),
     entry(
         Action::KeepCurves,
         Analyse,
@@ -464,7 +487,7 @@ pub fn info(action: Action) -> &'static Info {
 pub const TOOLBAR: &[&[Action]] = &[
     &[Action::Open, Action::Save],
     &[Action::Undo, Action::Redo],
-    &[Action::SelectTool, Action::PatchTool, Action::IntersectTool, Action::SelfIntersectTool],
+    &[Action::SelectTool, Action::PatchTool, Action::IntersectTool, Action::SelfIntersectTool, Action::MeasureTool],
     &[Action::FrameAll, Action::FrameSelection, Action::Perspective],
     &[Action::Shaded, Action::Wireframe, Action::Xray],
     &[Action::Edges, Action::IsoLines, Action::Section, Action::Inspect],

@@ -209,6 +209,7 @@ impl Editor {
             Action::KeepCurves | Action::ExportCurves => {
                 need(self.has_found_curves(), "no intersection curves have been found")
             }
+            Action::MeasureTool => need(!self.document().entities().is_empty(), "the model is empty"),
             Action::FindDefects => need(self.document().surfaces().next().is_some(), "there is no surface to look at"),
             Action::NextDefect | Action::PreviousDefect => self.can_step_defects(),
             Action::FixDefect => self.can_fix_defect(),
@@ -230,6 +231,7 @@ impl Editor {
             Action::Xray => display.xray,
             Action::Edges => display.edges,
             Action::IsoLines => display.isolines,
+            Action::Zebra => display.zebra,
             Action::WholeSurfaces => self.viewport.scene.shows_whole_surfaces(),
             Action::Section => self.viewport.section.is_some(),
             Action::LightTheme => self.settings.theme == Theme::Light,
@@ -240,6 +242,7 @@ impl Editor {
             Action::SelectTool => matches!(self.tool, Tool::Select),
             Action::PatchTool => matches!(self.tool, Tool::Patch(_)),
             Action::Inspect => matches!(self.tool, Tool::Inspect(_)),
+            Action::MeasureTool => matches!(self.tool, Tool::Measure(_)),
             Action::IntersectTool => self.intersect_task().is_some_and(|task| task != Task::Itself),
             Action::SelfIntersectTool => self.intersect_task() == Some(Task::Itself),
             _ => return None,
@@ -332,6 +335,7 @@ impl Editor {
             }
             Action::Edges => self.viewport.display.edges ^= true,
             Action::IsoLines => self.viewport.display.isolines ^= true,
+            Action::Zebra => self.viewport.display.zebra ^= true,
             Action::WholeSurfaces => self.viewport.toggle_whole_surfaces(),
             Action::Section => self.viewport.toggle_section(&visible_bounds(self.history.document())),
             Action::LightTheme => self.set_theme(ctx, Theme::Light),
@@ -366,6 +370,8 @@ impl Editor {
             Action::AdjustPatch => self.adjust_patch(),
             Action::Inspect if matches!(self.tool, Tool::Inspect(_)) => self.leave_tool(),
             Action::Inspect => self.start_inspect(),
+            Action::MeasureTool if matches!(self.tool, Tool::Measure(_)) => self.leave_tool(),
+            Action::MeasureTool => self.start_measure(),
             Action::IntersectTool => self.start_intersect(Task::Sets),
             Action::IntersectVisible => self.start_intersect(Task::Pairs),
             Action::SelfIntersectTool => self.start_intersect(Task::Itself),

@@ -11,6 +11,7 @@ pub mod histogram;
 pub mod inspect;
 pub mod intersection;
 pub mod legend;
+pub mod measure;
 pub mod navigation;
 pub mod patch_tool;
 pub mod pick;

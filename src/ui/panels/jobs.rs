@@ -56,6 +56,13 @@ pub fn show(ui: &mut Ui, editor: &mut Editor) {
                 for warning in record.job.warnings() {
                     ui.add(egui::Label::new(RichText::new(warning).color(t.warn).small()).wrap());
                 }
+                if !record.input.is_empty() {
+                    let beginning: Vec<&str> = record.input.lines().take(16).collect();
+                    let copy = ui.small_button("Copy input").on_hover_text(beginning.join("\n"));
+                    if copy.clicked() {
+                        ui.ctx().copy_text(record.input.clone());
+                    }
+                }
                 if let State::Panicked(message) = &record.state
                     && ui.small_button("Show details").clicked()
                 {

@@ -48,6 +48,7 @@ impl Editor {
             // A result is clicked itself, not the model under it.
             Tool::Intersect(session) if session.found.is_some() => (Filter::NONE, false),
             Tool::Intersect(_) => (Filter::SURFACES, false),
+            Tool::Measure(_) => (super::measure::FILTER, false),
         };
         if possible == Filter::NONE || self.document().entities().is_empty() {
             return;

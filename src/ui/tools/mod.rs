@@ -28,6 +28,7 @@ mod intersect_panel;
 mod intersect_plane;
 mod intersect_uv;
 mod legend;
+mod measure;
 mod patch;
 mod patch_overlay;
 mod patch_panel;
@@ -35,6 +36,7 @@ mod select;
 
 use inspect::InspectSession;
 use intersect::IntersectSession;
+use measure::MeasureSession;
 use patch::PatchSession;
 
 /// The active tool.
@@ -47,6 +49,8 @@ pub enum Tool {
     Inspect(Box<InspectSession>),
     /// Surfaces are intersected with each other or with themselves.
     Intersect(Box<IntersectSession>),
+    /// Two places are measured.
+    Measure(Box<MeasureSession>),
 }
 
 /// The list of everything under the cursor, opened by Alt+click.
@@ -79,6 +83,7 @@ impl Editor {
             }
             Tool::Inspect(_) => self.inspect_prompt(),
             Tool::Intersect(session) => Self::intersect_prompt(session),
+            Tool::Measure(session) => Self::measure_prompt(session),
         }
     }
 
@@ -94,6 +99,7 @@ impl Editor {
             Tool::Patch(_) => self.patch_keys(ctx),
             Tool::Inspect(_) => self.inspect_keys(ctx),
             Tool::Intersect(_) => self.intersect_keys(ctx),
+            Tool::Measure(_) => self.measure_keys(ctx),
         }
     }
 
@@ -112,7 +118,7 @@ impl Editor {
     /// Leaves the active tool.
     pub fn leave_tool(&mut self) {
         match &self.tool {
-            Tool::Select | Tool::Inspect(_) => {}
+            Tool::Select | Tool::Inspect(_) | Tool::Measure(_) => {}
             Tool::Patch(session) => session.healing.iter().for_each(Ticket::cancel),
             Tool::Intersect(session) => session.running.iter().for_each(Ticket::cancel),
         }
@@ -142,6 +148,7 @@ impl Editor {
             Tool::Patch(_) => self.patch_panel(ui),
             Tool::Inspect(_) => self.inspect_panel(ui),
             Tool::Intersect(_) => self.intersect_panel(ui),
+            Tool::Measure(_) => self.measure_panel(ui),
         }
     }
 
@@ -154,6 +161,7 @@ impl Editor {
             Tool::Intersect(session) => {
                 (Filter::SURFACES.and(self.pickable), Vec::new(), u64::from(session.found.is_some()))
             }
+            Tool::Measure(_) => (measure::FILTER.and(self.pickable), Vec::new(), 2),
         }
     }
 
@@ -161,12 +169,16 @@ impl Editor {
     pub fn tool_overlay(&mut self, dark: bool) -> Overlay {
         match &mut self.tool {
             Tool::Select => Overlay::default(),
-            Tool::Patch(session) => session.overlay(&self.viewport.scene, dark),
+            Tool::Patch(session) => {
+                session.follow(self.history.revision());
+                session.overlay(&self.viewport.scene, dark)
+            }
             Tool::Inspect(session) => session.overlay(dark),
             Tool::Intersect(session) => {
                 session.refresh_uv(dark);
                 session.overlay(&self.viewport.scene, dark)
             }
+            Tool::Measure(session) => session.overlay(dark),
         }
     }
 
@@ -174,7 +186,7 @@ impl Editor {
     /// domains of what is selected. It is asked every frame, so a tool keeps its pictures.
     pub fn tool_uv(&self) -> Vec<Arc<UvPicture>> {
         match &self.tool {
-            Tool::Select | Tool::Patch(_) => Vec::new(),
+            Tool::Select | Tool::Patch(_) | Tool::Measure(_) => Vec::new(),
             Tool::Inspect(session) => session.pictures.clone(),
             Tool::Intersect(session) => session.uv_pictures(),
         }
@@ -184,8 +196,8 @@ impl Editor {
     /// numbers that the tool gave them.
     pub fn tool_uv_pointer(&mut self, pointer: Option<&UvPointer>) {
         match &self.tool {
-            // Neither marks anything there.
-            Tool::Select | Tool::Patch(_) => {}
+            // They mark nothing there.
+            Tool::Select | Tool::Patch(_) | Tool::Measure(_) => {}
             Tool::Inspect(_) => self.inspect_uv_pointer(pointer),
             Tool::Intersect(_) => self.intersect_uv_pointer(pointer),
         }
@@ -205,6 +217,7 @@ impl Editor {
             Tool::Patch(_) => self.patch_pointer(pointer),
             Tool::Inspect(_) => self.inspect_pointer(pointer),
             Tool::Intersect(_) => self.intersect_pointer(pointer),
+            Tool::Measure(_) => self.measure_pointer(pointer),
         }
     }
 
@@ -215,6 +228,7 @@ impl Editor {
             Tool::Patch(_) => self.patch_labels(ui, pointer),
             Tool::Inspect(_) => self.inspect_labels(ui, pointer),
             Tool::Intersect(_) => self.intersect_labels(ui),
+            Tool::Measure(_) => self.measure_labels(ui, pointer),
         }
         self.filter_bar(ui);
         self.show_pick_list(ui);
@@ -261,6 +275,10 @@ impl Editor {
             Tool::Intersect(_) => {
                 let held = crate::view::navigation::Modifiers::NONE;
                 self.intersect_pointer(&Pointer { click: Some((Some(hit), held)), ..Pointer::default() });
+            }
+            Tool::Measure(_) => {
+                let held = crate::view::navigation::Modifiers::NONE;
+                self.measure_pointer(&Pointer { click: Some((Some(hit), held)), ..Pointer::default() });
             }
         }
     }
