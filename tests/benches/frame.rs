@@ -1,18 +1,22 @@
 //! The CPU's share of one frame in a scene of a million triangles and a hundred thousand line segments: dressing the
-//! scene, culling, uniforms and command encoding (phases: medians of wall time; "CPU": mean of this thread's time), against
-//! 4 ms for all of it and the panels. On a real GPU the time
-//! until the picture is there is shown as well.
+//! scene, culling, uniforms and command encoding (phases: medians of wall time; "CPU": mean of this thread's time), and
+//! the panels around it (the whole application driven by a mouse that turns the model: layout, picking, dressing,
+//! tessellation of the user interface), against 4 ms for all of it. On a real GPU the time until the picture is there is
+//! shown as well.
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a benchmark may stop at a broken scene")]
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use egui::{Event, Modifiers, PointerButton, Pos2, pos2};
 use glam::{DVec2, DVec3};
 use patchwright::kernel::geom::{Knots, Surface};
 use patchwright::kernel::job::Job;
 use patchwright::model::document::{Document, Shape, Unit};
+use patchwright::model::history::History;
 use patchwright::render::{Display, Emphasis, Gpu, Key, Look, Offscreen, Stage, VolumeItem};
+use patchwright::ui::{App, Options};
 use patchwright::view::camera::{Axis, Camera};
 use patchwright::view::inspect::{Coloring, Hierarchy, Shown, VolumeForm};
 use patchwright::view::scene::{Request, Scene};
@@ -143,6 +147,54 @@ fn main() {
         }
     }
     level(&mut offscreen, screen);
+    println!("the whole window up to encoding, CPU ms a frame (mean of this thread's time):");
+    println!("{:>9} {:>10} {:>9}  {:>9} {:>9}", "surfaces", "triangles", "segments", "turning", "hovering");
+    for n in [10, 30] {
+        window(n);
+    }
+}
+
+/// The application in its window while a hand turns the model, and while it only points: everything that runs on the
+/// CPU before commands are encoded.
+fn window(n: usize) {
+    let ctx = egui::Context::default();
+    let mut app = App::new(&eframe::CreationContext::_new_kittest(ctx.clone()), Options::default());
+    app.editor.history = History::new(hills(n), true);
+    let mut host = eframe::Frame::_new_kittest();
+    let screen = egui::Rect::from_min_size(Pos2::ZERO, egui::vec2(1920.0, 1080.0));
+    let mut time = 0.0;
+    let mut frame = |app: &mut App, events: Vec<Event>| {
+        time += 1.0 / 60.0;
+        let input = egui::RawInput { screen_rect: Some(screen), time: Some(time), events, ..Default::default() };
+        let output = ctx.run_ui(input, |ui| {
+            eframe::App::logic(app, ui.ctx(), &mut host);
+            eframe::App::ui(app, ui, &mut host);
+        });
+        ctx.tessellate(output.shapes, output.pixels_per_point);
+    };
+    let mut calm = 0;
+    while calm < 5 {
+        frame(&mut app, Vec::new());
+        let busy = app.editor.viewport.is_moving() || app.editor.files.is_opening();
+        calm = if busy { 0 } else { calm + 1 };
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    app.editor.viewport.scene = scene(n);
+    let at = |k: u32| pos2(960.0 + 3.0 * (k % 60) as f32, 540.0 + 0.4 * (k % 60) as f32);
+    let mut measured = |app: &mut App, first: Vec<Event>| {
+        frame(app, first);
+        let before = cpu();
+        for k in 0..ROUNDS {
+            frame(app, vec![Event::PointerMoved(at(k))]);
+        }
+        (cpu() - before).as_secs_f64() * 1e3 / f64::from(ROUNDS)
+    };
+    let hovering = measured(&mut app, Vec::new());
+    let press =
+        Event::PointerButton { pos: at(0), button: PointerButton::Middle, pressed: true, modifiers: Modifiers::NONE };
+    let turning = measured(&mut app, vec![press]);
+    let (triangles, segments) = app.editor.viewport.scene.counts();
+    println!("{:>9} {triangles:>10} {segments:>9}  {turning:>9.3} {hovering:>9.3}", n * n);
 }
 
 /// A level of 512 x 512 nodes as silhouettes: what the worker takes to dress it, and the frame's share of the CPU
