@@ -138,6 +138,35 @@ fn splines_follow_within_their_bound_in_space_and_in_both_domains() {
 }
 
 #[test]
+fn a_curve_over_a_seam_that_is_open_by_a_little_is_fitted_on_both_sides_of_it() {
+    // The stem of a model of the shared data: its seam does not quite close, and a curve that crosses it is one curve.
+    let whole = cylinder(1.0, -2.0, 2.0);
+    let [nu, _] = whole.knots().each_ref().map(Knots::control_count);
+    let mut points = whole.points().to_vec();
+    for row in points.chunks_mut(nu) {
+        row[nu - 1].x += 3e-7;
+    }
+    let [u, v] = whole.knots().clone();
+    let open = Surface::new(u, v, points, whole.weights().map(<[f64]>::to_vec)).unwrap();
+    let plane = turn(&rectangle(3.0, 3.0, 0.0), DVec3::new(0.6, 1.0, 0.0).normalize(), 0.4);
+    let found = met(&open, &plane);
+    let jump = |c: &patchwright::kernel::ssi::result::IntersectionCurve| {
+        c.points.windows(2).any(|w| w[0].xyz != w[1].xyz && (w[0].uv.x - w[1].uv.x).abs() > 0.5)
+    };
+    assert!(found.curves.iter().any(jump), "the case is none: no curve crosses the seam");
+    for curve in &found.curves {
+        let fit = fit_splines(curve, &[(0, &open), (1, &plane)], 1e-5).unwrap();
+        assert!(fit.within, "{}", fit.bound);
+        let [start, end] = fit.space.domain();
+        for k in 0..=400 {
+            let p = fit.space.eval(start + (end - start) * f64::from(k) / 400.0);
+            let off = (p.truncate().length() - 1.0).abs();
+            assert!(off <= 1e-5, "{p} is {off} off the cylinder");
+        }
+    }
+}
+
+#[test]
 fn biarcs_are_smooth_monotone_and_within_their_bound() {
     for (name, a, b) in pairs() {
         let surfaces = [(0, &a), (1, &b)];

@@ -31,7 +31,7 @@ fn row(name: &str, work: impl Fn(&Job) + Sync) {
     let begun = Instant::now();
     work(&Job::new());
     let whole = begun.elapsed();
-    let mut late: Vec<Duration> = (0..MOMENTS)
+    let mut late: Vec<(Duration, String)> = (0..MOMENTS)
         .filter_map(|k| {
             let job = Job::new();
             let watched = job.clone();
@@ -39,23 +39,24 @@ fn row(name: &str, work: impl Fn(&Job) + Sync) {
             std::thread::scope(|scope| {
                 let killer = scope.spawn(move || {
                     std::thread::sleep(wait);
+                    let phase = watched.current_phase();
                     watched.cancel();
-                    Instant::now()
+                    (Instant::now(), phase)
                 });
                 work(&job);
                 let ended = Instant::now();
                 // It may have come to its end before.
-                killer.join().ok().map(|asked| ended.saturating_duration_since(asked))
+                killer.join().ok().map(|(asked, phase)| (ended.saturating_duration_since(asked), phase))
             })
         })
         .collect();
     late.sort();
     let ms = |d: Duration| d.as_secs_f64() * 1e3;
-    let worst = late.last().copied().map_or(f64::NAN, ms);
+    let (worst, phase) = late.last().map_or((f64::NAN, ""), |(d, phase)| (ms(*d), phase.as_str()));
     println!(
-        "{name:44} {:>10.1} {:>10.2} {worst:>10.2}   {}",
+        "{name:44} {:>10.1} {:>10.2} {worst:>10.2}   {} (in {phase})",
         ms(whole),
-        late.get(late.len() / 2).copied().map_or(f64::NAN, ms),
+        late.get(late.len() / 2).map_or(f64::NAN, |(d, _)| ms(*d)),
         if worst < 100.0 { "met" } else { "missed" }
     );
 }

@@ -138,7 +138,7 @@ impl SurfaceSet {
         };
         let mut points = Vec::new();
         for ((number, _), mesh) in bodies.into_iter().zip(meshes) {
-            let Some((mesh, truth)) = mesh else { break };
+            let Some((mesh, truth)) = mesh.filter(|_| !job.is_cancelled()) else { break };
             let base = points.len() as u32;
             let first = set.triangles.len() as u32;
             if let Truth::Surface(sheet, _) = &truth {

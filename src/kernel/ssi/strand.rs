@@ -23,6 +23,10 @@ const LEAST_SINE: f64 = 1e-6;
 /// Where the direction comes from the neighbours, a larger turn (radians) between two chords is a corner.
 const CORNER: f64 = 0.35;
 
+/// The surface under the middle of a step is no farther off its chord than this many chords, unless the step crosses a
+/// seam.
+const JUMP: f64 = 4.0;
+
 /// Points closer than this are one.
 const SAME: f64 = 1e-9;
 
@@ -116,6 +120,14 @@ impl Ground {
                 continue;
             }
             let pieces = [self.piece_under(x.a, x.uv, y.uv)?, self.piece_under(x.b, x.st, y.st)?];
+            // Across a seam that is open by a little the points differ, and the parameters jump: between them the
+            // surface is elsewhere.
+            let middles = [0.5 * (x.uv + y.uv), 0.5 * (x.st + y.st)];
+            let away = |side: usize| self.point(pieces[side], middles[side]).distance(0.5 * (p + q));
+            if away(0).max(away(1)) > JUMP * p.distance(q) {
+                t += p.distance(q);
+                continue;
+            }
             let knot = |t: f64, p: DVec3, c: &CurvePoint| Knot {
                 t,
                 p,
