@@ -10,7 +10,7 @@ mod forms;
 use contours::contours;
 use forms::{cylinder, graph, rectangle, sphere, torus};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
-use patchwright::kernel::geom::Surface;
+use patchwright::kernel::geom::{Direction, Knots, Surface};
 use patchwright::kernel::job::Job;
 use patchwright::kernel::ssi::result::{CurveKind, JunctionKind};
 use patchwright::kernel::ssi::{Intersection, SsiError, SsiOptions, intersect};
@@ -183,6 +183,106 @@ fn degenerate_and_distant_surfaces_give_an_answer() {
     assert!(matches!(with(f64::NAN), Err(SsiError::Tolerance { .. })));
     assert!(matches!(with(1e3), Err(SsiError::TooLarge { .. })));
     assert!(matches!(intersect(&[], &[(1, &far)], &SsiOptions::default(), &Job::new()), Err(SsiError::Empty { .. })));
+}
+
+/// A blunt nose about the x axis in quarters that share a pole and, two by two, a meridian.
+fn nose() -> [Surface; 4] {
+    let profile = [(0.0, 0.0), (0.0, 0.6), (1.0, 1.0), (2.0, 1.0)];
+    let k = 0.5523;
+    let quarter = [(1.0, 0.0), (1.0, k), (k, 1.0), (0.0, 1.0)];
+    let points = quarter.iter().flat_map(|&(c, s)| profile.map(|(x, r)| DVec3::new(x, r * c, r * s))).collect();
+    let knots = Knots::bezier(3, 0.0, 1.0).unwrap();
+    let one = Surface::new(knots.clone(), knots, points, None).unwrap().transformed(&pose());
+    let axis = pose().transform_vector3(DVec3::X);
+    let origin = pose().translation;
+    [0.0, 1.0, 2.0, 3.0].map(|q| {
+        let about = DAffine3::from_axis_angle(axis, q * std::f64::consts::FRAC_PI_2);
+        let back = DAffine3::from_translation(origin) * about * DAffine3::from_translation(-origin);
+        one.transformed(&back)
+    })
+}
+
+/// The flat half of an airfoil, ruled between chord and contour, with a pole at either end (at the leading one all its
+/// lines run into one direction), and the wall that stands on its contour.
+fn airfoil() -> [Surface; 2] {
+    let contour = [(4.0, 0.0), (3.0, -0.8), (1.5, -0.9), (0.4, -0.8), (0.0, -0.5), (0.0, 0.0)];
+    let knots = [Knots::bezier(1, 0.0, 1.0).unwrap(), Knots::bezier(5, 0.0, 1.0).unwrap()];
+    let ruled = |other: &dyn Fn(f64, f64) -> DVec3| {
+        let points = contour.iter().flat_map(|&(x, z)| [DVec3::new(x, 0.0, z), other(x, z)]).collect();
+        Surface::new(knots[0].clone(), knots[1].clone(), points, None).unwrap().transformed(&pose())
+    };
+    [ruled(&|x, _| DVec3::new(x, 0.0, 0.0)), ruled(&|x, z| DVec3::new(1.0 + 0.7 * x, 3.0, 0.6 * z))]
+}
+
+#[test]
+fn patches_that_touch_at_a_pole_and_along_it_are_neighbours_without_a_crossing() {
+    let quarters = nose();
+    for k in 1..4 {
+        let result = meet(&quarters[0], &quarters[k]);
+        assert!(result.complete && result.curves.is_empty() && result.junctions.is_empty(), "quarter {k}");
+        assert!(result.counts.nodes_built < 5000, "quarter {k}: {} nodes", result.counts.nodes_built);
+    }
+}
+
+#[test]
+fn degenerate_borders_cost_neither_nodes_nor_entries_without_end() {
+    // Such pairs once gave a million unresolved entries each.
+    let [lens, wall] = airfoil();
+    let along = meet(&lens, &wall);
+    assert!(along.counts.nodes_built < 20_000 && along.unresolved.len() < 10);
+    let edge: f64 = along.curves.iter().flat_map(|c| c.points.windows(2)).map(|w| w[0].xyz.distance(w[1].xyz)).sum();
+    let contour: Vec<DVec3> = (0..=2000).map(|k| lens.eval(glam::DVec2::new(0.0, f64::from(k) / 2000.0))).collect();
+    let length: f64 = contour.windows(2).map(|w| w[0].distance(w[1])).sum();
+    assert!(edge > 0.999 * length, "the common edge is {edge} of {length}");
+    // The same half written the other way round, and the other half of the airfoil.
+    let again = lens.reversed(Direction::V).reversed(Direction::U);
+    let mirrored = {
+        let flip = pose() * DAffine3::from_scale(DVec3::new(1.0, 1.0, -1.0)) * pose().inverse();
+        lens.transformed(&flip)
+    };
+    for other in [again, mirrored] {
+        let result = meet(&lens, &other);
+        assert!(result.counts.nodes_built < 40_000 && result.unresolved.len() < 100);
+    }
+    // A patch that is a line, on the border of another one.
+    let line = lens.restricted([0.0, 1e-12], [0.0, 1.0]).unwrap();
+    let line = Surface::new(
+        line.knots()[0].clone(),
+        line.knots()[1].clone(),
+        line.points().chunks(2).flat_map(|w| [w[0], w[0]]).collect(),
+        None,
+    )
+    .unwrap();
+    let result = meet(&wall, &line);
+    assert!(!result.complete && result.unresolved.len() < 10 && result.counts.nodes_built < 20_000);
+    assert!(result.unresolved[0].reason.contains("without area"));
+}
+
+#[test]
+fn arcs_that_only_cut_the_corners_of_a_patch_are_found() {
+    // Both ends of each arc lie on the borders of the bowl, which is inside of the other patch.
+    for depth in [0.5, 0.02, 1e-4] {
+        let bowl = graph(2, |x, y| depth * (x * x + y * y - 1.9)).transformed(&pose());
+        let flat = rectangle(2.0, 2.0, 0.0).transformed(&pose());
+        for result in [meet(&flat, &bowl), meet(&bowl, &flat)] {
+            assert!(result.complete);
+            assert_eq!(result.curves.iter().filter(|c| !c.closed).count(), 4, "depth {depth}");
+        }
+    }
+}
+
+#[test]
+fn a_curve_may_run_into_a_pole() {
+    // A plane through the axis of the nose.
+    let flat = rectangle(3.0, 3.0, 0.0).transformed(&DAffine3::from_rotation_x(0.7)).transformed(&pose());
+    for quarter in [&nose()[0], &nose()[2]] {
+        let result = meet(quarter, &flat);
+        assert!(result.complete);
+        assert_eq!(result.curves.len(), 1);
+        let pole = pose().translation;
+        let ends = [result.curves[0].points[0].xyz, result.curves[0].points[result.curves[0].points.len() - 1].xyz];
+        assert!(ends.iter().any(|p| p.distance(pole) < 1e-6), "{ends:?}");
+    }
 }
 
 /// Random pairs of graphs against marching squares on their difference. Pairs on which two grids disagree have

@@ -20,19 +20,27 @@ pub fn chebyshev_node(n: usize, i: usize) -> f64 {
 pub fn to_bernstein(degree: [usize; 2], values: &[f64]) -> Vec<f64> {
     let [p, q] = degree;
     let (mu, mv) = (matrix(p), matrix(q));
+    let width = p + 1;
+    // Row after row, so that neighbours are added side by side.
     let mut half = vec![0.0; values.len()];
-    for j in 0..=q {
-        for i in 0..=p {
-            half[j * (p + 1) + i] = (0..=p).map(|k| mu[i * (p + 1) + k] * values[j * (p + 1) + k]).sum();
+    for (row, out) in mv.chunks_exact(q + 1).zip(half.chunks_exact_mut(width)) {
+        for (m, line) in row.iter().zip(values.chunks_exact(width)) {
+            out.iter_mut().zip(line).for_each(|(o, v)| *o += m * v);
         }
     }
+    let columns = transposed(mu, width);
     let mut out = vec![0.0; values.len()];
-    for j in 0..=q {
-        for i in 0..=p {
-            out[j * (p + 1) + i] = (0..=q).map(|k| mv[j * (q + 1) + k] * half[k * (p + 1) + i]).sum();
+    for (line, out) in half.chunks_exact(width).zip(out.chunks_exact_mut(width)) {
+        for (v, column) in line.iter().zip(columns.chunks_exact(width)) {
+            out.iter_mut().zip(column).for_each(|(o, m)| *o += m * v);
         }
     }
     out
+}
+
+/// The transpose of a square matrix.
+fn transposed(m: &[f64], n: usize) -> Vec<f64> {
+    (0..n * n).map(|k| m[(k % n) * n + k / n]).collect()
 }
 
 /// The inverse of the matrix of Bernstein values at the nodes.
@@ -80,6 +88,30 @@ fn basis(n: usize, t: f64) -> [f64; MAX_FIT + 1] {
     b
 }
 
+/// The Bernstein polynomials of degree `2 <= n <= MAX_FIT` with their first and second derivatives, in one recurrence.
+fn basis_with_derivatives(n: usize, t: f64) -> [[f64; MAX_FIT + 1]; 3] {
+    let raised = |b: &[f64; MAX_FIT + 1], degree: usize| {
+        let mut out = [0.0; MAX_FIT + 1];
+        let mut carry = 0.0;
+        for (out, old) in out.iter_mut().zip(b).take(degree + 2) {
+            *out = old * (1.0 - t) + carry;
+            carry = old * t;
+        }
+        out
+    };
+    let low2 = basis(n - 2, t);
+    let low1 = raised(&low2, n - 2);
+    let all = raised(&low1, n - 1);
+    let (mut b1, mut b2) = ([0.0; MAX_FIT + 1], [0.0; MAX_FIT + 1]);
+    let (f1, f2) = (n as f64, (n * (n - 1)) as f64);
+    for i in 0..=n {
+        let at = |b: &[f64; MAX_FIT + 1], back: usize| if i >= back { b[i - back] } else { 0.0 };
+        b1[i] = f1 * (at(&low1, 1) - low1[i]);
+        b2[i] = f2 * (at(&low2, 2) - 2.0 * at(&low2, 1) + low2[i]);
+    }
+    [all, b1, b2]
+}
+
 /// A polynomial of degree `n` in both variables over [0, 1]^2.
 #[derive(Clone, Debug)]
 pub struct Poly2 {
@@ -106,42 +138,31 @@ impl Poly2 {
         Self { n, c: to_bernstein([n, n], values) }
     }
 
-    /// The value and derivatives.
-    pub fn eval(&self, x: f64, y: f64) -> Value2 {
+    /// The value alone.
+    pub fn value(&self, x: f64, y: f64) -> f64 {
         let n = self.n;
-        let derivative = |t: f64| {
-            let low1 = basis(n - 1, t);
-            let low2 = basis(n - 2, t);
-            let (mut b1, mut b2) = ([0.0; MAX_FIT + 1], [0.0; MAX_FIT + 1]);
-            for i in 0..n {
-                let v = low1[i] * n as f64;
-                b1[i] -= v;
-                b1[i + 1] += v;
-            }
-            for i in 0..n - 1 {
-                let v = low2[i] * (n * (n - 1)) as f64;
-                b2[i] += v;
-                b2[i + 1] -= 2.0 * v;
-                b2[i + 2] += v;
-            }
-            [basis(n, t), b1, b2]
-        };
-        let (bx, by) = (derivative(x), derivative(y));
+        let (bx, by) = (basis(n, x), basis(n, y));
+        let along = |row: &[f64]| row.iter().zip(&bx).map(|(c, b)| c * b).sum::<f64>();
+        self.c.chunks_exact(n + 1).zip(&by).map(|(row, b)| along(row) * b).sum()
+    }
+
+    /// The value and derivatives; the degree is at least 2.
+    pub fn eval(&self, x: f64, y: f64) -> Value2 {
+        let (bx, by) = (basis_with_derivatives(self.n, x), basis_with_derivatives(self.n, y));
         let mut out = Value2::default();
-        for j in 0..=n {
-            let mut along = [0.0; 3];
-            for i in 0..=n {
-                let c = self.c[j * (n + 1) + i];
-                for (k, sum) in along.iter_mut().enumerate() {
-                    *sum += c * bx[k][i];
-                }
+        for (j, row) in self.c.chunks_exact(self.n + 1).enumerate() {
+            let (mut f, mut d, mut h) = (0.0, 0.0, 0.0);
+            for ((c, b0), (b1, b2)) in row.iter().zip(&bx[0]).zip(bx[1].iter().zip(&bx[2])) {
+                f += c * b0;
+                d += c * b1;
+                h += c * b2;
             }
-            out.f += along[0] * by[0][j];
-            out.d[0] += along[1] * by[0][j];
-            out.d[1] += along[0] * by[1][j];
-            out.h[0] += along[2] * by[0][j];
-            out.h[1] += along[1] * by[1][j];
-            out.h[2] += along[0] * by[2][j];
+            out.f += f * by[0][j];
+            out.d[0] += d * by[0][j];
+            out.d[1] += f * by[1][j];
+            out.h[0] += h * by[0][j];
+            out.h[1] += d * by[1][j];
+            out.h[2] += f * by[2][j];
         }
         out
     }

@@ -25,6 +25,10 @@ const DEGREE: usize = 8;
 pub const ROUNDING: f64 = 2e-15;
 /// Cells smaller than this fraction of the fitted one are given up.
 const SMALLEST: f64 = 1.0 / 16384.0;
+/// Down to this fraction of the fitted one coincident cells are split where they lie across a border of the other piece.
+const ACROSS: f64 = 1.0 / 32.0;
+/// How often a cell is halved to tell apart where the zero set crosses a border of the other piece.
+const RIM_DEPTH: usize = 12;
 /// More cells than this and the fit is given up (the node is split and fitted again).
 const MOST_CELLS: usize = 3000;
 
@@ -159,53 +163,67 @@ pub fn fit(a: &Piece, node: &Node, b: &Piece, other: &Node) -> Option<Contact> {
         }
         Some(((ja.p - jb.p).dot(n), st))
     };
-    // The foot of the middle, then serpentine from there.
+    // The foot of the middle, then outwards from there, each predicted from those that are known.
     let (_, center) = sample(0.5, 0.5, other.local(DVec2::ZERO))?;
     let nodes: [f64; DEGREE + 1] = std::array::from_fn(|i| chebyshev_node(DEGREE, i));
-    let w = DEGREE + 1;
-    let (mut g, mut s, mut t) = (vec![0.0; w * w], vec![0.0; w * w], vec![0.0; w * w]);
-    let mut row_start = center;
-    for j in (0..=DEGREE / 2).rev().chain(DEGREE / 2 + 1..w) {
-        if j == DEGREE / 2 + 1 {
-            let k = (DEGREE / 2) * w + DEGREE / 2;
-            row_start = DVec2::new(s[k], t[k]);
-        }
-        let mut start = row_start;
-        for i in (0..=DEGREE / 2).rev().chain(DEGREE / 2 + 1..w) {
-            if i == DEGREE / 2 + 1 {
-                start = row_start;
-            }
-            let k = j * w + i;
-            // Predict from the two before in the row.
-            let back = if i > DEGREE / 2 { [i - 1, i.saturating_sub(2)] } else { [i + 1, i + 2] };
-            if i + 2 <= DEGREE / 2 || i > DEGREE / 2 {
-                let x = |i: usize| nodes[i];
-                let known = |i: usize| DVec2::new(s[j * w + i], t[j * w + i]);
-                let f = (x(i) - x(back[0])) / (x(back[0]) - x(back[1]));
-                start = known(back[0]) + (known(back[0]) - known(back[1])) * f;
-            }
+    const W: usize = DEGREE + 1;
+    const M: usize = DEGREE / 2;
+    let mut g = vec![0.0; W * W];
+    let mut feet = [[DVec2::ZERO; W]; W];
+    for j in (0..=M).rev().chain(M + 1..W) {
+        let inner_row = if j > M { j.wrapping_sub(1) } else { j + 1 };
+        for i in (0..=M).rev().chain(M + 1..W) {
+            let start = if i == M {
+                match j.abs_diff(M) {
+                    0 => center,
+                    1 if j < M => feet[M][M],
+                    _ => extrapolated(&nodes, j, |j| feet[j][M]),
+                }
+            } else if i.abs_diff(M) + usize::from(i > M) * M > 2 {
+                extrapolated(&nodes, i, |i| feet[j][i])
+            } else {
+                let inner = if i > M { i - 1 } else { i + 1 };
+                let step = if j == M { DVec2::ZERO } else { feet[inner_row][i] - feet[inner_row][inner] };
+                feet[j][inner] + step
+            };
             let (gap, st) = sample(nodes[i], nodes[j], start)?;
-            (g[k], s[k], t[k]) = (gap, st.x, st.y);
-            start = st;
-            if i == DEGREE / 2 {
-                row_start = st;
-            }
+            (g[j * W + i], feet[j][i]) = (gap, st);
         }
     }
-    let (g, s, t) = (Poly2::fit(DEGREE, &g), Poly2::fit(DEGREE, &s), Poly2::fit(DEGREE, &t));
-    let mut error: f64 = 0.0;
-    for (x, y) in [(0.02, 0.5), (0.98, 0.41), (0.31, 0.02), (0.62, 0.98), (0.31, 0.69), (0.69, 0.12)] {
-        let (gap, _) = sample(x, y, DVec2::new(s.eval(x, y).f, t.eval(x, y).f))?;
-        error = error.max((gap - g.eval(x, y).f).abs());
-    }
+    let g = Poly2::fit(DEGREE, &g);
     let [min, max] = g.range();
-    let error = 4.0 * error + ROUNDING;
-    if error > (1e-5 * min.abs().max(max.abs())).max(8.0 * ROUNDING) {
-        return None;
+    let allowed = (1e-5 * min.abs().max(max.abs())).max(8.0 * ROUNDING);
+    // Measured between the nodes, each foot predicted from the nearest node.
+    let mut error = ROUNDING;
+    for (x, y) in [(0.02, 0.5), (0.98, 0.41), (0.31, 0.02), (0.62, 0.98), (0.31, 0.69), (0.69, 0.12)] {
+        let near = |x: f64| (0..W).min_by(|&i, &k| (nodes[i] - x).abs().total_cmp(&(nodes[k] - x).abs())).unwrap_or(M);
+        let (gap, _) = sample(x, y, feet[near(y)][near(x)])?;
+        error = f64::max(error, 4.0 * (gap - g.value(x, y)).abs() + ROUNDING);
+        if error > allowed {
+            return None;
+        }
     }
+    let by = |k: usize| Poly2::fit(DEGREE, &feet.iter().flatten().map(|f| f[k]).collect::<Vec<_>>());
+    let (s, t) = (by(0), by(1));
     let ([s0, s1], [t0, t1]) = (s.range(), t.range());
     let feet = [DVec2::new(s0, t0), DVec2::new(s1, t1)];
     Some(Contact { pa: node.piece, pb: other.piece, low: node.low, high: node.high, g, s, t, error, feet })
+}
+
+/// The foot at node `i` of the Chebyshev nodes, from up to four nodes further inwards that are known (the middle one
+/// and those between, and beyond the middle where `i` lies in the second half).
+fn extrapolated(nodes: &[f64; DEGREE + 1], i: usize, known: impl Fn(usize) -> DVec2) -> DVec2 {
+    let middle = DEGREE / 2;
+    let inner = |k: usize| if i < middle { i + k } else { i - k };
+    let count = if i < middle { middle - i } else { i }.min(4);
+    let mut out = DVec2::ZERO;
+    for k in 1..=count {
+        let others = (1..=count).filter(|&l| l != k);
+        let weight =
+            others.map(|l| (nodes[i] - nodes[inner(l)]) / (nodes[inner(k)] - nodes[inner(l)])).product::<f64>();
+        out += known(inner(k)) * weight;
+    }
+    out
 }
 
 /// A cell during the analysis.
@@ -239,6 +257,12 @@ impl Affine {
         }
         let h = p.hessian_range().map(|r| r[0].abs().max(r[1].abs()));
         Self { c, d, r, h }
+    }
+
+    /// Whether the values over a rectangle surely lie in [0, 1], or hardly outside.
+    fn inside(&self, low: DVec2, size: DVec2) -> bool {
+        let (middle, half) = (self.c + self.d.dot(low + 0.5 * size), 0.5 * self.d.abs().dot(size) + self.r);
+        middle - half >= -1e-6 && middle + half <= 1.0 + 1e-6
     }
 
     /// Whether the values over a rectangle lie outside [0, 1] or only touch its ends: what lies on a border belongs
@@ -278,7 +302,7 @@ impl Contact {
     fn pair(&self, xy: DVec2) -> PointPair {
         PointPair {
             uv: self.low + (self.high - self.low) * xy,
-            st: DVec2::new(self.s.eval(xy.x, xy.y).f, self.t.eval(xy.x, xy.y).f),
+            st: DVec2::new(self.s.value(xy.x, xy.y), self.t.value(xy.x, xy.y)),
         }
     }
 
@@ -306,11 +330,15 @@ impl Contact {
             }
             if self.regular(&sub) {
                 self.border_seeds(&sub, &mut found);
+                self.rim_seeds(&sub, [&s, &t], &mut found);
                 continue;
             }
             let size = sub.size.max_element();
             match self.one_critical(&sub, contact, &mut found) {
-                Critic::Said => continue,
+                Critic::Said => {
+                    self.rim_seeds(&sub, [&s, &t], &mut found);
+                    continue;
+                }
                 Critic::TooCoarse => return false,
                 Critic::Unknown => {}
             }
@@ -327,8 +355,12 @@ impl Contact {
                 if self.error > (0.5 * contact).max(8.0 * ROUNDING) {
                     return false;
                 }
-                found.coincident.push(self.cell(&sub));
-                continue;
+                // Of a cell across the border only the part on this side counts.
+                let inside = |feet: &Affine| feet.inside(sub.low, sub.size);
+                if size < ACROSS || (inside(&s) && inside(&t)) {
+                    found.coincident.push(self.cell(&sub));
+                    continue;
+                }
             }
             if size < SMALLEST {
                 if self.error > 8.0 * ROUNDING {
@@ -390,6 +422,83 @@ impl Contact {
         }
     }
 
+    /// Seeds where the zero set crosses the borders of B's piece within a cell: an arc may have both its ends there,
+    /// and the parts of it on the cell's border outside of B. In each part of the cell where the gradients of the gap
+    /// and of the foot's parameter keep turning the same way there is at most one crossing.
+    fn rim_seeds(&self, sub: &Sub, feet: [&Affine; 2], found: &mut Findings) {
+        for (affine, poly) in feet.into_iter().zip([&self.s, &self.t]) {
+            for bound in [0.0, 1.0] {
+                let mut stack = vec![(sub.g.clone(), sub.low, sub.size, 0)];
+                while let Some((g, low, size, depth)) = stack.pop() {
+                    let [min, max] = g.range();
+                    if min > self.error || max < -self.error {
+                        continue;
+                    }
+                    let at = low + 0.5 * size;
+                    let reach = 0.5 * affine.d.abs().dot(size) + affine.r;
+                    if (affine.c + affine.d.dot(at) - bound).abs() > reach {
+                        continue;
+                    }
+                    let v = poly.eval(at.x, at.y);
+                    let half = 0.5 * size;
+                    let sway = DVec2::new(
+                        affine.h[0] * half.x + affine.h[1] * half.y,
+                        affine.h[1] * half.x + affine.h[2] * half.y,
+                    ) * size;
+                    let slope = DVec2::from(v.d) * size;
+                    if (v.f - bound).abs() > 0.5 * (slope.abs() + sway).element_sum() {
+                        continue;
+                    }
+                    let [gx, gy] = g.gradient_range();
+                    let times = |r: [f64; 2], k: f64, spread: f64| {
+                        let ends = [r[0] * (k - spread), r[0] * (k + spread), r[1] * (k - spread), r[1] * (k + spread)];
+                        ends.into_iter().fold([f64::INFINITY, f64::NEG_INFINITY], |a, x| [a[0].min(x), a[1].max(x)])
+                    };
+                    let (p, q) = (times(gx, slope.y, sway.y), times(gy, slope.x, sway.x));
+                    let turns = p[0] - q[1] > 0.0 || p[1] - q[0] < 0.0;
+                    if turns || depth >= RIM_DEPTH {
+                        if let Some(xy) = self.crossing(poly, bound, at) {
+                            let inside = ((xy - at).abs() - half).max_element() < 1e-6;
+                            if inside {
+                                self.seed(xy, found);
+                            }
+                        }
+                        continue;
+                    }
+                    let along = usize::from(size.y > size.x);
+                    let [first, second] = g.split(along);
+                    let mut part = size;
+                    part[along] *= 0.5;
+                    let mut middle = low;
+                    middle[along] += part[along];
+                    stack.push((second, middle, part, depth + 1));
+                    stack.push((first, low, part, depth + 1));
+                }
+            }
+        }
+    }
+
+    /// Where the gap is zero and a parameter of the foot has a value, by Newton's method.
+    fn crossing(&self, foot: &Poly2, value: f64, start: DVec2) -> Option<DVec2> {
+        let mut xy = start;
+        for _ in 0..20 {
+            let (g, s) = (self.g.eval(xy.x, xy.y), foot.eval(xy.x, xy.y));
+            let m = glam::DMat2::from_cols_array(&[g.d[0], s.d[0], g.d[1], s.d[1]]);
+            let step = m.inverse() * DVec2::new(g.f, s.f - value);
+            if !step.is_finite() {
+                return None;
+            }
+            xy -= step * (0.5 / step.length()).min(1.0);
+            if (xy - 0.5).abs().max_element() > 1.0 {
+                return None;
+            }
+            if step.length() < 1e-12 {
+                return Some(xy);
+            }
+        }
+        None
+    }
+
     fn seed(&self, xy: DVec2, found: &mut Findings) {
         let at = self.pair(xy);
         if at.st.min_element() >= -1e-3 && at.st.max_element() <= 1.0 + 1e-3 {
@@ -440,7 +549,7 @@ impl Contact {
             self.border_seeds(sub, found);
             return Critic::Said;
         };
-        let gap = sub.g.eval(p.x, p.y).f;
+        let gap = sub.g.value(p.x, p.y);
         let place = sub.low + sub.size * p;
         let upward = xx[0] > 0.0;
         if extremum && ((gap > contact + self.error && upward) || (gap < -contact - self.error && !upward)) {
@@ -462,7 +571,7 @@ impl Contact {
             for direction in [DVec2::X, DVec2::Y, -DVec2::X, -DVec2::Y] {
                 let value = |t: f64| {
                     let q = p + direction * t;
-                    sub.g.eval(q.x, q.y).f * sign
+                    sub.g.value(q.x, q.y) * sign
                 };
                 let reach =
                     if direction.x + direction.y > 0.0 { (DVec2::ONE - p).dot(direction) } else { p.dot(-direction) };
@@ -519,7 +628,7 @@ impl Contact {
             }
             if settled && p.min_element() > -0.05 && p.max_element() < 1.05 {
                 inside.push(p);
-                values.push(sub.g.eval(p.x, p.y).f * upward);
+                values.push(sub.g.value(p.x, p.y) * upward);
             }
         }
         let limit = contact + self.error;
@@ -534,11 +643,12 @@ impl Contact {
             return true;
         }
         if min >= -limit && max <= limit {
-            let middle = inside[inside.len() / 2];
-            let at = self.pair(sub.low + sub.size * middle);
-            if at.st.min_element() >= -SLACK && at.st.max_element() <= 1.0 + SLACK {
-                found.ridges.push(Seed { pa: self.pa, pb: self.pb, at });
-            }
+            // From the middle outwards, the first place that lies on B.
+            let mut order: Vec<usize> = (0..inside.len()).collect();
+            order.sort_by_key(|&k| k.abs_diff(inside.len() / 2));
+            let places = order.into_iter().map(|k| self.pair(sub.low + sub.size * inside[k]));
+            let on_b = |at: &PointPair| at.st.min_element() >= -SLACK && at.st.max_element() <= 1.0 + SLACK;
+            found.ridges.extend(places.into_iter().find(on_b).map(|at| Seed { pa: self.pa, pb: self.pb, at }));
             return true;
         }
         if min > limit && min > 0.5 * max {

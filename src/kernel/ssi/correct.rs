@@ -84,7 +84,7 @@ pub fn correct(
 ) -> Option<Corrected> {
     let mut x = start.to_array();
     let mut last = f64::INFINITY;
-    let mut polished = false;
+    let (mut polished, mut good) = (false, None);
     for _ in 0..ITERATIONS {
         let at = PointPair::from_array(x);
         let (ja, jb) = (a.jet1(at.uv), b.jet1(at.st));
@@ -127,11 +127,15 @@ pub fn correct(
         if x.iter().any(|v| !(v.abs() < 1e8)) {
             return None;
         }
-        // One step after a small one is as good as Newton gets.
-        polished = length < 1e-9 && residual < 1e-9 && length <= 0.5 * last;
+        // One step after a small one is as good as Newton gets; near a pole small in space is not small in parameters.
+        let turn = step.iter().fold(0.0, |m: f64, s| m.max(s.abs()));
+        if length < 1e-9 && residual < 1e-9 && length <= 0.5 * last {
+            polished = turn < 1e-9;
+            good = Some(Corrected { at, a: ja, b: jb, residual });
+        }
         last = length;
     }
-    None
+    good
 }
 
 /// Solves four equations in four unknowns (the fifth column is the right-hand side).

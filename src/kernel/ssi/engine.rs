@@ -27,8 +27,9 @@ use super::result::{Counts, CurveEnd, Intersection, Times, Unresolved};
 use super::side::{Frame, Side};
 use super::tangency::from_tori;
 use super::trace::{Disc, End, Mode, TraceNode, TraceOptions, Tracer};
-use super::traverse::{ArcPair, Traversal, traverse};
-use super::tree::Tree;
+use super::traverse::{ArcPair, OpenPair, TOO_SMALL, Traversal, traverse};
+use super::tree::{Node, Tree};
+use super::undecided::{self, Undecided};
 use crate::kernel::geom::{Aabb, Surface};
 use crate::kernel::job::Job;
 use crate::kernel::tol::Tolerances;
@@ -160,7 +161,7 @@ pub fn intersect(
     };
     job.phase("Finding where the surfaces meet");
     let [ref left, ref right] = engine.sides;
-    let traversal = traverse([left, right], &mut engine.trees, engine.gap, job);
+    let traversal = traverse([left, right], &mut engine.trees, engine.gap, engine.trace.joining, job);
     let traversed = clock.elapsed();
     job.phase("Following curves");
     engine.run(&traversal, job);
@@ -178,6 +179,12 @@ pub fn intersect(
 
 /// How near a seed on a border must be to a curve on it to be one with it, in the unit frame.
 const SAME_ON_BORDER: f64 = 5e-7;
+
+/// What is nearer than this is one point, in the unit frame: ten times what pairs of nodes are divided down to.
+const SAME_POINT: f64 = 1e-8;
+
+/// A curve from border to border that is shorter than this is a point.
+const SHORTEST: f64 = 1e-9;
 
 fn on_border(node: &TraceNode) -> bool {
     node.at.to_array().iter().any(|x| !(2.0 * SLACK..=1.0 - 2.0 * SLACK).contains(x))
@@ -209,11 +216,6 @@ pub struct Engine {
 
 impl Engine {
     fn run(&mut self, traversal: &Traversal, job: &Job) {
-        for &(ia, ib, reason) in &traversal.unresolved {
-            let (a, b) = (&self.trees[0].nodes[ia], &self.trees[1].nodes[ib]);
-            let entry = self.unresolved_at([a.piece, b.piece], [a.low, a.high], [b.low, b.high], reason);
-            self.unresolved.push(entry);
-        }
         self.find_contacts(&traversal.findings);
         let (coincident, undecided) = self.flat_contacts(&traversal.findings);
         for contact in 0..self.contacts.len() {
@@ -229,7 +231,7 @@ impl Engine {
         let total = (traversal.arcs.len() + traversal.findings.seeds.len()).max(1) as f64;
         for (k, seed) in traversal.findings.seeds.iter().enumerate() {
             if job.is_cancelled() {
-                self.cancelled();
+                self.cancelled(traversal);
                 return;
             }
             self.trace_contact_seed(seed);
@@ -237,12 +239,13 @@ impl Engine {
         }
         for (k, arc) in traversal.arcs.iter().enumerate() {
             if job.is_cancelled() {
-                self.cancelled();
+                self.cancelled(traversal);
                 return;
             }
             self.trace_arc(arc);
             job.progress(0.5 + 0.5 * (k + traversal.findings.seeds.len()) as f64 / total);
         }
+        self.open_pairs(&traversal.unresolved);
         self.regions = region::regions(self, &coincident);
         if self.regions.is_empty() {
             self.settle_undecided(&coincident);
@@ -250,7 +253,39 @@ impl Engine {
         self.settle_undecided(&undecided);
     }
 
-    fn cancelled(&mut self) {
+    /// Lists what the descent left, apart from points in which only borders meet (no crossing is there) and those
+    /// that a curve runs into.
+    fn open_pairs(&mut self, pairs: &[OpenPair]) {
+        let mut open = Vec::new();
+        for pair in pairs {
+            let (a, b) = (&self.trees[0].nodes[pair.a], &self.trees[1].nodes[pair.b]);
+            if pair.reason == TOO_SMALL && self.only_touches([a, b]) {
+                continue;
+            }
+            open.push(Undecided {
+                entry: self.unresolved_at([a.piece, b.piece], [a.low, a.high], [b.low, b.high], pair.reason),
+                extent: a.bounds.union(&b.bounds).diagonal() / self.frame.scale,
+            });
+        }
+        self.unresolved.extend(undecided::merged(open));
+    }
+
+    /// Whether a pair of nodes as small as a point lies on borders of both sides, or at an end of a curve.
+    fn only_touches(&self, pair: [&Node; 2]) -> bool {
+        let near = |p: DVec3| p.distance(pair[0].c) < SAME_POINT;
+        let on_border = |side: usize| {
+            let node = pair[side];
+            self.sides[side].borders_of(node.piece).iter().any(|e| {
+                let pole = e.bounds.diagonal() < SAME_POINT && near(e.bounds.center());
+                pole || if e.value > 0.5 { node.high[e.fixed] >= 1.0 } else { node.low[e.fixed] <= 0.0 }
+            })
+        };
+        let ends = |c: &Chain| [c.nodes.first(), c.nodes.last()].into_iter().flatten().any(|n| near(n.p));
+        (on_border(0) && on_border(1)) || self.chains.iter().any(ends)
+    }
+
+    fn cancelled(&mut self, traversal: &Traversal) {
+        self.open_pairs(&traversal.unresolved);
         let whole = [DVec2::ZERO, DVec2::ONE];
         let entry = self.unresolved_at([0, 0], whole, whole, "cancelled");
         self.unresolved.push(entry);
@@ -511,6 +546,11 @@ impl Engine {
             nodes.pop();
         }
         nodes.extend(forward);
+        // A corner that touches the other side is no curve.
+        let touches = start.end == CurveEnd::Boundary && end == End::Boundary;
+        if touches && nodes.iter().all(|n| n.p.distance(node.p) < SHORTEST) {
+            return;
+        }
         self.finish(mode, nodes, start, end);
     }
 
@@ -631,21 +671,21 @@ impl Engine {
 
     /// Cells that no gap function decided, unless a junction explains them.
     fn settle_undecided(&mut self, cells: &[Cell]) {
+        let mut open = Vec::new();
         for cell in cells {
-            let p = self.sides[0].pieces[cell.pa].point(cell.middle.uv);
+            let piece = &self.sides[0].pieces[cell.pa];
+            let p = piece.point(cell.middle.uv);
             let explained = self.contacts.iter().any(|c| c.binormal.p.distance(p) < c.radius);
             if !explained {
+                let size = piece.point(cell.low).distance(p) + piece.point(cell.high).distance(p);
                 let around = [cell.middle.st - 1e-4, cell.middle.st + 1e-4];
-                let entry = self.unresolved_at(
-                    [cell.pa, cell.pb],
-                    [cell.low, cell.high],
-                    around,
-                    "the contact is of higher order than can be told",
-                );
-                if self.unresolved.len() < 1000 {
-                    self.unresolved.push(entry);
-                }
+                let reason = "the contact is of higher order than can be told";
+                open.push(Undecided {
+                    entry: self.unresolved_at([cell.pa, cell.pb], [cell.low, cell.high], around, reason),
+                    extent: size / self.frame.scale,
+                });
             }
         }
+        self.unresolved.extend(undecided::merged(open));
     }
 }

@@ -119,6 +119,7 @@ impl Ring<'_> {
             rates: [0.0; 4],
             sine: 1.0,
             sense: 0.0,
+            off: 0.5 * ja.p.distance(jb.p),
         })
     }
 }
@@ -215,6 +216,7 @@ fn arm(ring: &Ring<'_>, radius: f64, angles: [f64; 3]) -> Option<Arm> {
             rates: [0.0; 4],
             sine: 1.0,
             sense: 0.0,
+            off: 0.5 * ja.p.distance(jb.p),
         });
     }
     // Tangents from the parabola through the neighbours.

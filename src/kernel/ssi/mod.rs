@@ -20,6 +20,7 @@ pub mod pairs;
 mod piece;
 mod region;
 pub mod result;
+mod seam;
 mod side;
 pub mod spline_fit;
 mod strand;
@@ -28,6 +29,7 @@ pub mod torus_binormal;
 mod trace;
 mod traverse;
 mod tree;
+mod undecided;
 
 pub use biarc::{Biarcs, fit_biarcs};
 pub use correct::{Condition, Corrected, PointPair, correct};

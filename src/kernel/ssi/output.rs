@@ -10,7 +10,6 @@ use super::engine::{Chain, Engine};
 use super::piece::{Patch, Piece};
 use super::region::RegionPoint;
 use super::result::{CurveEnd, CurveKind, CurvePoint, Intersection, IntersectionCurve, Junction, JunctionKind, Region};
-use super::side::Side;
 use super::trace::{Mode, TraceNode, Tracer, hermite};
 
 /// How often the stretch between two traced points is divided again.
@@ -29,15 +28,15 @@ impl Bounds {
     }
 }
 
-/// An upper bound of the distance from the chord between two points to a piece on which both (nearly) lie, at the
-/// parameters `x` and `y`.
+/// An upper bound of the distance from the chord between two points to a piece, where both lie within `off` of their
+/// places on it, the parameters `x` and `y` in [0, 1]^2.
 ///
 /// Filip's bound for D(t) = chord(t) - S(x(t)) with x(t) = x + (y - x) t + q t (1 - t): |D| is at most that of the ends
 /// plus max |D''| / 8. q takes the tangential part of D'' away, which would measure the parametrization and not the
-/// distance; D'' is evaluated in the middle, and third derivatives bound how it varies.
-fn chord_bound(side: &Side, index: usize, bounds: &DerivativeBounds, ends: [(DVec2, DVec3); 2]) -> f64 {
-    let [(x, p), (y, r)] = ends;
-    let piece = &side.pieces[index];
+/// distance; D'' is evaluated in the middle, and third derivatives bound how it varies. Where x(t) would leave the
+/// piece, q has no part across that border: the bounds hold on the piece only, and beyond a knot line another one goes
+/// on with derivatives of its own.
+fn chord_bound(piece: &Piece, bounds: &DerivativeBounds, [x, y]: [DVec2; 2], off: f64) -> f64 {
     let delta = y - x;
     let jet = piece.jet2(0.5 * (x + y));
     let [uu, uv, vv] = jet.second;
@@ -50,32 +49,19 @@ fn chord_bound(side: &Side, index: usize, bounds: &DerivativeBounds, ends: [(DVe
     } else {
         DVec2::ZERO
     };
-    let q = if q.length() <= delta.length() { q } else { DVec2::ZERO };
+    let mut q = if q.length() <= delta.length() { q } else { DVec2::ZERO };
+    let room = x.min(y).min(DVec2::ONE - x.max(y));
+    if 0.25 * q.x.abs() > room.x {
+        q.x = 0.0;
+    }
+    if 0.25 * q.y.abs() > room.y {
+        q.y = 0.0;
+    }
     let middle = (bend - (jet.u * q.x + jet.v * q.y) * 2.0).length();
     let (dq, w) = (q.abs(), delta.abs() + q.abs());
     let away = 0.5 * delta.abs() + 0.25 * dq;
     let varies = 0.5 * bounds.third(w) + 2.0 * bounds.second(dq, w) + 2.0 * bounds.second(away, dq);
-    // x(t) may leave the piece where it runs along a border.
-    let inside = x.min(y).min(DVec2::ONE - x.max(y)).max(DVec2::ZERO);
-    let beyond = (0.25 * dq - inside).max(DVec2::ZERO);
-    let mut leaves = 0.0;
-    if beyond != DVec2::ZERO {
-        leaves = bounds.first(beyond);
-        // Beyond an inner border the next piece goes on; where both have one tangent plane it is as near.
-        let fixed = usize::from(beyond.y > beyond.x);
-        let value = if x[fixed] + y[fixed] > 1.0 { 1.0 } else { 0.0 };
-        if let Some(next) = side.neighbour(index, fixed, value).filter(|_| beyond[1 - fixed] == 0.0) {
-            let mut at = 0.5 * (x + y);
-            at[fixed] = 1.0 - value;
-            let n = side.pieces[next].jet1(at).cross().normalize_or_zero();
-            let across = if fixed == 0 { jet.u } else { jet.v };
-            if n != DVec3::ZERO {
-                leaves = beyond[fixed] * across.dot(n).abs() + 2.0 * bounds.second(beyond, beyond + w);
-            }
-        }
-    }
-    let own = piece.point(x).distance(p).max(piece.point(y).distance(r));
-    own + (middle + varies) / 8.0 + leaves
+    off + (middle + varies) / 8.0
 }
 
 /// Everything in model units.
@@ -99,6 +85,7 @@ pub fn assemble(engine: &Engine, tol: f64) -> Intersection {
                 rates: [0.0; 4],
                 sine: 1.0,
                 sense: 0.0,
+                off: 0.0,
             };
             let point = point_of(engine, &node);
             let kind = match contact.arms.len() {
@@ -139,13 +126,27 @@ pub fn assemble(engine: &Engine, tol: f64) -> Intersection {
     }
 }
 
-/// A traced point in model units and surface parameters, on the pieces' closed domains.
+/// A traced point on the pieces' closed domains: corrections may leave them by rounding near a border.
+fn settled(engine: &Engine, node: &TraceNode) -> TraceNode {
+    let at = PointPair { uv: node.at.uv.clamp(DVec2::ZERO, DVec2::ONE), st: node.at.st.clamp(DVec2::ZERO, DVec2::ONE) };
+    if at == node.at {
+        return *node;
+    }
+    let (a, b) = (engine.sides[0].pieces[node.pa].point(at.uv), engine.sides[1].pieces[node.pb].point(at.st));
+    TraceNode { at, p: 0.5 * (a + b), off: 0.5 * a.distance(b), ..*node }
+}
+
+/// A traced point in model units and surface parameters.
 pub fn point_of(engine: &Engine, node: &TraceNode) -> CurvePoint {
     let (a, b) = (&engine.sides[0].pieces[node.pa], &engine.sides[1].pieces[node.pb]);
-    let uv = node.at.uv.clamp(DVec2::ZERO, DVec2::ONE);
-    let st = node.at.st.clamp(DVec2::ZERO, DVec2::ONE);
-    let p = if uv == node.at.uv && st == node.at.st { node.p } else { 0.5 * (a.point(uv) + b.point(st)) };
-    CurvePoint { xyz: engine.frame.to_model(p), a: a.surface, uv: a.to_surface(uv), b: b.surface, st: b.to_surface(st) }
+    let node = settled(engine, node);
+    CurvePoint {
+        xyz: engine.frame.to_model(node.p),
+        a: a.surface,
+        uv: a.to_surface(node.at.uv),
+        b: b.surface,
+        st: b.to_surface(node.at.st),
+    }
 }
 
 fn curve(engine: &Engine, tracer: &Tracer<'_>, bounds: &mut Bounds, chain: &Chain, tol: f64) -> IntersectionCurve {
@@ -161,31 +162,33 @@ fn curve(engine: &Engine, tracer: &Tracer<'_>, bounds: &mut Bounds, chain: &Chai
             points.push(point);
         }
     };
-    for (k, from) in chain.nodes.iter().enumerate() {
+    let nodes: Vec<TraceNode> = chain.nodes.iter().map(|n| settled(engine, n)).collect();
+    for (k, from) in nodes.iter().enumerate() {
         push(from);
-        let Some(to) = chain.nodes.get(k + 1) else { break };
+        let Some(to) = nodes.get(k + 1) else { break };
         if !to.same_pair(from) {
-            bound = bound.max(from.p.distance(to.p));
+            bound = bound.max(from.p.distance(to.p) + from.off + to.off);
             continue;
         }
         let (a, b) = (&engine.sides[0].pieces[from.pa], &engine.sides[1].pieces[from.pb]);
         let own = [bounds.get(0, from.pa, a), bounds.get(1, from.pb, b)];
-        let off = |x: &TraceNode, y: &TraceNode| {
-            let on_a = chord_bound(&engine.sides[0], from.pa, &own[0], [(x.at.uv, x.p), (y.at.uv, y.p)]);
-            on_a.max(chord_bound(&engine.sides[1], from.pb, &own[1], [(x.at.st, x.p), (y.at.st, y.p)]))
+        let within = |x: &TraceNode, y: &TraceNode| {
+            let off = x.off.max(y.off);
+            let on_a = chord_bound(a, &own[0], [x.at.uv, y.at.uv], off);
+            on_a.max(chord_bound(b, &own[1], [x.at.st, y.at.st], off))
         };
         let mut stack = vec![(*from, *to, 0)];
         while let Some((x, y, depth)) = stack.pop() {
-            let here = off(&x, &y);
+            let here = within(&x, &y);
             if here <= wanted || depth == DEEPEST || x.p.distance(y.p) < 1e-9 {
                 bound = bound.max(here);
                 push(&y);
                 continue;
             }
-            let parts = (here / (0.8 * wanted)).sqrt().ceil().clamp(2.0, MOST_PARTS);
+            let parts = (here / (0.9 * wanted)).sqrt().ceil().clamp(2.0, MOST_PARTS);
             let mut last = y;
             for j in (1..parts as usize).rev() {
-                let next = between(tracer, chain.mode, &x, &y, j as f64 / parts);
+                let next = settled(engine, &between(tracer, chain.mode, &x, &y, j as f64 / parts));
                 stack.push((next, last, depth + 1));
                 last = next;
             }
@@ -226,7 +229,8 @@ fn boundary_bound(engine: &Engine, bounds: &mut Bounds, line: &[RegionPoint]) ->
             let [from, to] = places[side];
             let piece = &engine.sides[side].pieces[from.piece];
             let own = bounds.get(side, from.piece, piece);
-            chord_bound(&engine.sides[side], from.piece, &own, [(from.uv, x.p), (to.uv, y.p)])
+            let off = piece.point(from.uv).distance(x.p).max(piece.point(to.uv).distance(y.p));
+            chord_bound(piece, &own, [from.uv, to.uv], off)
         };
         [on(0), on(1)].into_iter().fold(0.0, f64::max)
     };
@@ -239,13 +243,14 @@ fn between(tracer: &Tracer<'_>, mode: Mode, from: &TraceNode, to: &TraceNode, f:
     let pair = [from.pa, from.pb];
     let chord = (to.p - from.p).normalize_or_zero();
     let (a, b) = (&tracer.sides[0].pieces[pair[0]], &tracer.sides[1].pieces[pair[1]]);
-    let p = 0.5 * (a.point(at.uv) + b.point(at.st));
+    let (on_a, on_b) = (a.point(at.uv), b.point(at.st));
+    let p = 0.5 * (on_a + on_b);
     let condition = Condition::Plane { point: p, direction: chord };
     let length = from.p.distance(to.p);
     let found = tracer.locate(mode, pair, at, condition, chord);
     let inside = |x: &PointPair| x.to_array().iter().all(|v| (-1e-6..=1.0 + 1e-6).contains(v));
     found.filter(|n| n.p.distance(p) < 0.1 * length && inside(&n.at)).unwrap_or_else(|| {
         let rates = std::array::from_fn(|k| from.rates[k] * (1.0 - f) + to.rates[k] * f);
-        TraceNode { at, p, tangent: chord, rates, ..*from }
+        TraceNode { at, p, tangent: chord, rates, off: 0.5 * on_a.distance(on_b), ..*from }
     })
 }

@@ -37,12 +37,15 @@ impl Frame {
 
 /// A border of a piece at which its surface ends.
 #[derive(Clone, Debug)]
-struct BorderEdge {
-    piece: usize,
+pub struct BorderEdge {
+    /// Which piece.
+    pub piece: usize,
     /// 0: u is fixed, 1: v is fixed.
-    fixed: usize,
-    value: f64,
-    bounds: Aabb,
+    pub fixed: usize,
+    /// At what value, 0 or 1.
+    pub value: f64,
+    /// A box around it.
+    pub bounds: Aabb,
 }
 
 /// A place on a piece.
@@ -88,6 +91,13 @@ impl Side {
             }
         }
         side
+    }
+
+    /// The borders of a piece at which its surface ends.
+    pub fn borders_of(&self, piece: usize) -> &[BorderEdge] {
+        let first = self.borders.partition_point(|e| e.piece < piece);
+        let count = self.borders[first..].partition_point(|e| e.piece == piece);
+        &self.borders[first..first + count]
     }
 
     /// The piece beyond a border of a piece within the same surface.
@@ -142,7 +152,7 @@ impl Side {
     }
 
     /// The closest point of a border edge.
-    fn onto_edge(&self, edge: &BorderEdge, p: DVec3) -> Option<(DVec2, f64)> {
+    pub fn onto_edge(&self, edge: &BorderEdge, p: DVec3) -> Option<(DVec2, f64)> {
         let piece = &self.pieces[edge.piece];
         let free = 1 - edge.fixed;
         let at = |t: f64| {

@@ -15,7 +15,7 @@ use super::binormal;
 use super::contact::SLACK;
 use super::correct::{Condition, PointPair, correct};
 use super::piece::{Jet1, Patch};
-use super::side::{Place, Side};
+use super::side::{Place, Side, closest_from};
 
 /// A traced point.
 #[derive(Clone, Copy, Debug)]
@@ -36,6 +36,8 @@ pub struct TraceNode {
     pub sine: f64,
     /// The sign of the tangent against N_A x N_B; 0 on tangential curves.
     pub sense: f64,
+    /// How far `p` is from the points of both surfaces at the parameters.
+    pub off: f64,
 }
 
 /// The smallest sine of an angle that is told from 0.
@@ -65,6 +67,9 @@ pub enum Mode {
 
 /// A curve that changes a parameter less than this while another one changes by 1 runs along its border.
 const SHALLOW: f64 = 1e-5;
+
+/// From within this distance of a pole, in the unit frame, a curve that runs into it is led there.
+const NEAR_POLE: f64 = 1e-6;
 
 /// A disc around a junction in which its own arms take over.
 #[derive(Clone, Copy, Debug)]
@@ -190,7 +195,8 @@ impl Tracer<'_> {
         };
         let tangent = if against { -tangent } else { tangent };
         let rates = rates(&ja, &jb, tangent)?;
-        let node = TraceNode { pa: pair[0], pb: pair[1], at, p, tangent, rates, sine, sense };
+        let off = ja.p.distance(p).max(jb.p.distance(p));
+        let node = TraceNode { pa: pair[0], pb: pair[1], at, p, tangent, rates, sine, sense, off };
         // A border along the curve does not fix a point of it.
         if let Condition::Fixed(k, _) = condition
             && mode == Mode::Transversal
@@ -208,6 +214,7 @@ impl Tracer<'_> {
         let mut start = start;
         let mut current = start;
         let mut h = 0.05 * self.reach(&current);
+        let mut bend = [0.0; 4];
         let mut hops = 0;
         let mut travelled = 0.0;
         loop {
@@ -219,6 +226,7 @@ impl Tracer<'_> {
                 if hops > 12 {
                     return (out, End::Unresolved("the curve runs to and fro across a border"));
                 }
+                bend = [0.0; 4];
                 match self.cross(mode, &current, k) {
                     Some(next) => {
                         if travelled > 1e-7 && next.same_pair(&start) && self.meets(&next, &start) {
@@ -242,9 +250,15 @@ impl Tracer<'_> {
             h = h.min(0.3 * self.reach(&current));
             let (middle, next) = loop {
                 if h < 1e-11 {
-                    return (out, End::Unresolved("the curve cannot be followed"));
+                    return match self.pole(&current) {
+                        Some(last) => {
+                            out.push(last);
+                            (out, End::Boundary)
+                        }
+                        None => (out, End::Unresolved("the curve cannot be followed")),
+                    };
                 }
-                match self.step(mode, &current, h) {
+                match self.step(mode, &current, h, &bend) {
                     Ok((middle, next, error)) => {
                         let factor = (0.5 * self.options.tol / error.max(1e-30)).powf(0.25) * 0.9;
                         let used = h;
@@ -257,6 +271,8 @@ impl Tracer<'_> {
                     Err(()) => h *= 0.4,
                 }
             };
+            let length = current.p.distance(next.p);
+            bend = std::array::from_fn(|k| (next.rates[k] - current.rates[k]) / length);
             let exit = self.exit(mode, &current, &next);
             let (ends, leaving) = match exit {
                 Ok(None) => (vec![middle, next], false),
@@ -268,6 +284,7 @@ impl Tracer<'_> {
                         && hops < 12
                     {
                         hops += 1;
+                        bend = [0.0; 4];
                         current = beyond;
                         out.push(beyond);
                         continue;
@@ -291,6 +308,7 @@ impl Tracer<'_> {
                 }
                 match self.cross(mode, &current, k) {
                     Some(beyond) => {
+                        bend = [0.0; 4];
                         current = beyond;
                         out.push(beyond);
                         continue;
@@ -335,10 +353,11 @@ impl Tracer<'_> {
         1.0 / node.rates.iter().fold(1e-3, |m: f64, r| m.max(r.abs()))
     }
 
-    fn step(&self, mode: Mode, from: &TraceNode, h: f64) -> Result<(TraceNode, TraceNode, f64), ()> {
+    /// A step of about length `h`, predicted from the rates and how they changed last.
+    fn step(&self, mode: Mode, from: &TraceNode, h: f64, bend: &[f64; 4]) -> Result<(TraceNode, TraceNode, f64), ()> {
         let pair = [from.pa, from.pb];
         let x = from.at.to_array();
-        let guess = PointPair::from_array(std::array::from_fn(|k| x[k] + h * from.rates[k]));
+        let guess = PointPair::from_array(std::array::from_fn(|k| x[k] + h * (from.rates[k] + 0.5 * h * bend[k])));
         let plane = Condition::Plane { point: from.p + from.tangent * h, direction: from.tangent };
         let next = self.locate(mode, pair, guess, plane, from.tangent).ok_or(())?;
         let chord = next.p - from.p;
@@ -380,7 +399,40 @@ impl Tracer<'_> {
             } else {
                 return false;
             };
-            outward * 0.1 * reach > SLACK
+            outward * reach > SHALLOW
+        })
+    }
+
+    /// The pole (a border of a piece that is one point) into which the curve runs, where no step can be corrected.
+    fn pole(&self, from: &TraceNode) -> Option<TraceNode> {
+        let own = [(from.pa, from.at.uv), (from.pb, from.at.st)];
+        (0..2).find_map(|side| {
+            let (piece, uv) = own[side];
+            let (other, guess) = own[1 - side];
+            let borders = self.sides[side].borders_of(piece).iter();
+            let mut poles = borders.filter(|e| e.bounds.diagonal() <= self.options.joining);
+            poles.find_map(|edge| {
+                let tip = edge.bounds.center();
+                let way = tip - from.p;
+                if way.length() > NEAR_POLE || way.dot(from.tangent) < 0.5 * way.length() - 1e-9 {
+                    return None;
+                }
+                let (there, distance) = closest_from(&self.sides[1 - side].pieces[other], tip, guess);
+                if distance > self.options.joining {
+                    return None;
+                }
+                let mut here = uv;
+                here[edge.fixed] = edge.value;
+                let (uv, st) = if side == 0 { (here, there) } else { (there, here) };
+                let at = PointPair { uv, st };
+                let beside = self.sides[1 - side].pieces[other].point(there);
+                let p = 0.5 * (tip + beside);
+                let (x, y) = (from.at.to_array(), at.to_array());
+                let length = p.distance(from.p).max(1e-300);
+                let rates = std::array::from_fn(|k| (y[k] - x[k]) / length);
+                let off = 0.5 * tip.distance(beside) + edge.bounds.diagonal();
+                Some(TraceNode { at, p, rates, off, ..*from })
+            })
         })
     }
 

@@ -1,7 +1,9 @@
 //! Lazily subdivided nodes over the pieces, and what a pair of nodes can prove.
 //!
-//! A node is its affine part c + au x + av y over [-1, 1]^2 and bounds of the remainder and of its derivatives,
-//! split into normal and tangential components: 300-500 bytes of working data. For a pair the linear system
+//! A node is its affine part c + au x + av y over [-1, 1]^2 and bounds of the remainder and of its derivatives, by
+//! their components along au, av and the normal: 300-500 bytes of working data. Components and not lengths, so that a
+//! node may be as thin and slanting as nodes are where the edge of a patch collapses: what a pair proves then does not
+//! depend on their shape. For a pair the linear system
 //! A - B = 0 is solved for the tube that contains every solution:
 //!
 //! ```text
@@ -24,6 +26,10 @@ use glam::{DVec2, DVec3};
 use super::piece::Piece;
 use super::side::Side;
 use crate::kernel::geom::Aabb;
+
+/// Three columns whose triple product is smaller than this, against the product of their lengths, span space by rounding
+/// only: what is computed with them proves nothing.
+const LEAST_SPAN: f64 = 1e-11;
 
 /// The share of a rational node's size from which on the error of its interpolant is made smaller.
 const REFIT: f64 = 1e-4;
@@ -51,12 +57,12 @@ pub struct Node {
     pub n: DVec3,
     /// How far the normal may turn, roughly, in radians (infinite where degenerate).
     pub tilt: f64,
-    /// Bounds of the remainder: normal, tangential.
-    r: [f64; 2],
-    /// Bounds of its derivatives by x: normal, tangential.
-    dx: [f64; 2],
-    /// Bounds of its derivatives by y: normal, tangential.
-    dy: [f64; 2],
+    /// Bounds of the remainder: its components along `au`, `av` and `n`.
+    r: [f64; 3],
+    /// Bounds of its derivatives by x, likewise.
+    pub dx: [f64; 3],
+    /// Bounds of its derivatives by y, likewise.
+    pub dy: [f64; 3],
     degree: [usize; 2],
     net: Vec<DVec3>,
     pad: f64,
@@ -82,13 +88,18 @@ impl Node {
         let (lu, lv, area) = (au.length(), av.length(), cross.length());
         let flat = area > 1e-9 * lu * lv && area > 0.0;
         let n = if flat { cross / area } else { DVec3::ZERO };
-        // Tangential parts are squared until all were seen.
-        let parts = |v: DVec3, bound: &mut [f64; 2]| {
-            let h = v.dot(n);
-            bound[0] = bound[0].max(h.abs());
-            bound[1] = bound[1].max(v.length_squared() - h * h);
+        // The components of a vector along au, av and n; without a normal its length stands for all three.
+        let dual = if flat { [av.cross(n) / area, n.cross(au) / area, n] } else { [DVec3::ZERO; 3] };
+        let parts = |v: DVec3, bound: &mut [f64; 3]| {
+            if flat {
+                for (most, d) in bound.iter_mut().zip(dual) {
+                    *most = most.max(v.dot(d).abs());
+                }
+            } else {
+                bound[2] = bound[2].max(v.length());
+            }
         };
-        let (mut r, mut dx, mut dy) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        let (mut r, mut dx, mut dy) = ([0.0; 3], [0.0; 3], [0.0; 3]);
         for j in 0..=q {
             for i in 0..=p {
                 let (x, y) = (2.0 * i as f64 / p as f64 - 1.0, 2.0 * j as f64 / q as f64 - 1.0);
@@ -101,17 +112,17 @@ impl Node {
                 }
             }
         }
-        for bound in [&mut r, &mut dx, &mut dy] {
-            bound[1] = bound[1].sqrt() + 1e-15 * (lu + lv);
-        }
-        for k in 0..2 {
-            r[k] += pad;
-            dx[k] += pad * (p * p) as f64;
-            dy[k] += pad * (q * q) as f64;
+        let noise = [pad, pad * (p * p) as f64, pad * (q * q) as f64];
+        for (bound, noise) in [&mut r, &mut dx, &mut dy].into_iter().zip(noise) {
+            let rounding = 1e-15 * (lu + lv) + noise;
+            for (most, d) in bound.iter_mut().zip(dual).take(2) {
+                *most += d.length() * rounding;
+            }
+            bound[2] += noise;
         }
         let tilt = if flat {
-            let turn = (dx[0] * lv + dy[0] * lu) / area;
-            let stretch = (dx[1] * lv + dy[1] * lu) / area;
+            let turn = (dx[2] * lv + dy[2] * lu) / area;
+            let stretch = dx[0] + dy[1] + dx[1] * dy[0];
             if stretch < 0.8 { turn / (1.0 - stretch) } else { f64::INFINITY }
         } else {
             f64::INFINITY
@@ -145,18 +156,27 @@ impl Node {
 
     /// A length that says how large the node is.
     pub fn size(&self) -> f64 {
-        self.au.length() + self.av.length() + self.r[0] + self.r[1]
+        self.au.length() + self.av.length() + self.length(self.r)
     }
 
-    /// The normal and tangential parts of a covector: their products with a remainder's bounds bound its action.
-    fn split(&self, k: DVec3) -> [f64; 2] {
-        let h = k.dot(self.n);
-        [h.abs(), (k.length_squared() - h * h).max(0.0).sqrt()]
+    /// A bound of the length of a vector whose components are within these bounds.
+    fn length(&self, bound: [f64; 3]) -> f64 {
+        bound[0] * self.au.length() + bound[1] * self.av.length() + bound[2]
+    }
+
+    /// What a covector makes of the vectors along which components are taken: the products with a remainder's bounds
+    /// bound its action.
+    pub fn split(&self, k: DVec3) -> [f64; 3] {
+        if self.n == DVec3::ZERO {
+            return [0.0, 0.0, k.length()];
+        }
+        [k.dot(self.au).abs(), k.dot(self.av).abs(), k.dot(self.n).abs()]
     }
 }
 
-fn reach(k: [f64; 2], bound: [f64; 2]) -> f64 {
-    k[0] * bound[0] + k[1] * bound[1]
+/// A bound of what a covector, split, makes of a vector within bounds.
+pub fn reach(k: [f64; 3], bound: [f64; 3]) -> f64 {
+    k[0] * bound[0] + k[1] * bound[1] + k[2] * bound[2]
 }
 
 /// All nodes of one side that were built so far.
@@ -212,8 +232,8 @@ impl Tree {
         let node = &self.nodes[index];
         let [p, q] = node.degree;
         // Along the direction in which it is longer or bends more.
-        let score = |a: DVec3, d: [f64; 2], n: usize| {
-            a.length() + 4.0 * (d[0] + d[1] - 2.0 * node.pad * (n * n) as f64).max(0.0)
+        let score = |a: DVec3, d: [f64; 3], n: usize| {
+            a.length() + 4.0 * (node.length(d) - 3.0 * node.pad * (n * n) as f64).max(0.0)
         };
         let along = if score(node.au, node.dx, p) >= score(node.av, node.dy, q) { 0 } else { 1 };
         let (mut first, mut second) = (node.net.clone(), node.net.clone());
@@ -292,26 +312,17 @@ pub fn judge(a: &Node, b: &Node, gap: f64) -> Verdict {
         return Verdict::Unknown;
     }
     let columns = [a.au, a.av, -b.au, -b.av];
-    let m = columns.iter().fold(glam::DMat3::ZERO, |m, &v| m + glam::DMat3::from_cols(v * v.x, v * v.y, v * v.z));
-    let trace = m.x_axis.x + m.y_axis.y + m.z_axis.z;
-    if !(m.determinant() > 1e-26 * trace * trace * trace) {
-        return Verdict::Unknown;
-    }
-    let inverse = m.inverse();
-    let k: [DVec3; 4] = columns.map(|c| inverse * c);
+    // The null direction: signed 3 x 3 minors.
+    let minor = |i: usize, j: usize, l: usize| columns[i].dot(columns[j].cross(columns[l]));
+    let mut tau = [minor(1, 2, 3), -minor(0, 2, 3), minor(0, 1, 3), -minor(0, 1, 2)];
+    let Some(k) = pseudo_inverse(&columns, &tau) else { return Verdict::Unknown };
+    let length = tau.iter().map(|t| t * t).sum::<f64>().sqrt();
+    tau.iter_mut().for_each(|t| *t /= length);
     let splits = k.map(|row| (a.split(row), b.split(row)));
     let rho: [f64; 4] = std::array::from_fn(|j| {
         let (in_a, in_b) = splits[j];
         reach(in_a, a.r) + reach(in_b, b.r) + k[j].length() * gap
     });
-    // The null direction: signed 3 x 3 minors.
-    let minor = |i: usize, j: usize, l: usize| columns[i].dot(columns[j].cross(columns[l]));
-    let mut tau = [minor(1, 2, 3), -minor(0, 2, 3), minor(0, 1, 3), -minor(0, 1, 2)];
-    let length = tau.iter().map(|t| t * t).sum::<f64>().sqrt();
-    if !(length > 0.0) {
-        return Verdict::Unknown;
-    }
-    tau.iter_mut().for_each(|t| *t /= length);
     let x0 = k.map(|row| -row.dot(d));
     let mut range = [f64::NEG_INFINITY, f64::INFINITY];
     for j in 0..4 {
@@ -328,11 +339,35 @@ pub fn judge(a: &Node, b: &Node, gap: f64) -> Verdict {
     if range[0] > range[1] {
         return Verdict::Empty;
     }
-    let row = |(in_a, in_b): ([f64; 2], [f64; 2])| {
+    let row = |(in_a, in_b): ([f64; 3], [f64; 3])| {
         reach(in_a, a.dx) + reach(in_a, a.dy) + reach(in_b, b.dx) + reach(in_b, b.dy)
     };
     let contraction = splits.into_iter().map(row).fold(0.0, f64::max);
     if contraction < 0.8 { Verdict::Arc { x0, tau, range } } else { Verdict::Unknown }
+}
+
+/// The rows of the pseudo-inverse of J = [c0 c1 c2 c3], given its signed minors (`minors[l]` without column l).
+///
+/// With D the three columns of the largest minor and w = D^-1 c the fourth in their terms, J = D [I w] and J+ is
+/// [I w]^T (I + w w^T)^-1 D^-1, which is well conditioned however thin and slanting the nodes are; J J^T is not.
+/// `None` when no three columns span space.
+fn pseudo_inverse(columns: &[DVec3; 4], minors: &[f64; 4]) -> Option<[DVec3; 4]> {
+    let left_out = (0..4).max_by(|&i, &j| minors[i].abs().total_cmp(&minors[j].abs()))?;
+    let kept = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]][left_out];
+    let d = kept.map(|k| columns[k]);
+    let det = d[0].dot(d[1].cross(d[2]));
+    if !(det.abs() > LEAST_SPAN * d[0].length() * d[1].length() * d[2].length()) {
+        return None;
+    }
+    let dual = [d[1].cross(d[2]) / det, d[2].cross(d[0]) / det, d[0].cross(d[1]) / det];
+    let w = dual.map(|row| row.dot(columns[left_out]));
+    let sum = dual[0] * w[0] + dual[1] * w[1] + dual[2] * w[2];
+    let share = sum / (1.0 + w.iter().map(|w| w * w).sum::<f64>());
+    let mut out = [share; 4];
+    for (place, k) in kept.into_iter().enumerate() {
+        out[k] = dual[place] - share * w[place];
+    }
+    Some(out)
 }
 
 /// A polynomial net over a rectangle of a rational piece, and the error measured between the nodes.
@@ -371,4 +406,36 @@ fn interpolated(piece: &Piece, rect: [DVec2; 2]) -> ([usize; 2], Vec<DVec3>, f64
         }
     }
     (degree, net, error)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_pseudo_inverse_is_one_however_thin_the_nodes_are() {
+        for thin in [1.0, 1e-3, 1e-8] {
+            let columns = [
+                DVec3::new(0.0, 0.0, thin),
+                DVec3::new(thin * thin, 0.0, 0.7 * thin),
+                DVec3::new(0.1, -1.0, 0.2),
+                DVec3::new(-thin * thin, 0.1 * thin, -thin),
+            ];
+            let minor = |i: usize, j: usize, l: usize| columns[i].dot(columns[j].cross(columns[l]));
+            let minors = [minor(1, 2, 3), -minor(0, 2, 3), minor(0, 1, 3), -minor(0, 1, 2)];
+            let k = pseudo_inverse(&columns, &minors).unwrap();
+            // K J is the projection onto what is across the null direction.
+            let square = minors.iter().map(|m| m * m).sum::<f64>();
+            for i in 0..4 {
+                for j in 0..4 {
+                    let wanted = f64::from(u8::from(i == j)) - minors[i] * minors[j] / square;
+                    assert!((k[i].dot(columns[j]) - wanted).abs() < 1e-6, "{thin} {i} {j}");
+                }
+            }
+        }
+        let flat = [DVec3::X, DVec3::Y, DVec3::new(0.3, 0.1, 1e-17), DVec3::new(0.1, -0.7, -1e-17)];
+        let minor = |i: usize, j: usize, l: usize| flat[i].dot(flat[j].cross(flat[l]));
+        let minors = [minor(1, 2, 3), -minor(0, 2, 3), minor(0, 1, 3), -minor(0, 1, 2)];
+        assert!(pseudo_inverse(&flat, &minors).is_none(), "parallel planes, but for rounding");
+    }
 }
