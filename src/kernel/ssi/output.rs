@@ -2,7 +2,7 @@
 //!
 //! The bound is one of the chords between points, as true as rounding: see [`chord_bound`].
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 
 use super::correct::{Condition, PointPair};
 use super::derivative_bounds::DerivativeBounds;

@@ -120,7 +120,7 @@ impl Descent<'_> {
         loop {
             while let Some((ia, ib)) = stack.pop() {
                 self.out.judged += 1;
-                if self.out.judged % 4096 == 0 && job.is_cancelled() {
+                if self.out.judged.is_multiple_of(4096) && job.is_cancelled() {
                     stack.append(&mut next);
                     stack.push((ia, ib));
                     self.give_up(stack, "cancelled");
