@@ -47,9 +47,14 @@ pub fn open(bytes: &[u8], format: Format) -> Result<Opened, DiscreteError> {
         }
         _ => {
             let mesh = stl::read(bytes, &mut report);
-            meshes(mesh, "STL solid", "facets of three vertices, in ASCII or binary", report)
+            of_stl(mesh, report)
         }
     }
+}
+
+/// The mesh of an STL file as a document.
+pub fn of_stl(mesh: TriMesh, report: ImportReport) -> Result<Opened, DiscreteError> {
+    meshes(mesh, "STL solid", "facets of three vertices, in ASCII or binary", report)
 }
 
 fn meshes(mesh: TriMesh, kind: &str, what: &'static str, mut report: ImportReport) -> Result<Opened, DiscreteError> {

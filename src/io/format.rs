@@ -42,6 +42,11 @@ impl Format {
 
     /// The format that the bytes of a file look like.
     pub fn of_content(bytes: &[u8]) -> Option<Self> {
+        Self::of_beginning(bytes, bytes.len() as u64)
+    }
+
+    /// The format that a file of this length looks like by its first bytes.
+    pub fn of_beginning(bytes: &[u8], length: u64) -> Option<Self> {
         let first = bytes.split(|&b| b == b'\n' || b == b'\r').find(|line| !line.trim_ascii().is_empty())?;
         if first.len() >= 73 && matches!(first[72], b'S' | b'G' | b'D') {
             return Some(Self::Iges);
@@ -49,7 +54,7 @@ impl Format {
         if super::step::part21::looks_like(bytes) {
             return Some(Self::Step);
         }
-        if super::stl::looks_like(bytes) {
+        if super::stl::looks_like(bytes, length) {
             return Some(Self::Stl);
         }
         let text = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes).trim_ascii_start();

@@ -4,6 +4,8 @@
 //! extension. Every reader returns an [`ImportReport`] beside the document: an entity of the file either becomes
 //! geometry or a line there. Every writer replaces the old file in one step, or leaves it as it was.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use crate::model::document::Document;
@@ -31,6 +33,9 @@ pub use atomic::WriteError;
 pub use discrete::DiscreteError;
 pub use format::{Format, PROJECT_EXTENSION};
 pub use report::{ImportReport, ReportLine, Severity};
+
+/// How many bytes of a file are looked at to see whether it has to be read as a whole.
+const BEGINNING: u64 = 4096;
 
 /// A file that was read.
 #[derive(Clone, Debug)]
@@ -152,9 +157,24 @@ pub struct Saved {
     pub export: Option<export::ExportSummary>,
 }
 
-/// Reads a model.
+/// Reads a model. Of a whole binary STL file a few batches are in memory at a time;
+/// other files are read as a whole.
 pub fn open(path: &Path) -> Result<Opened, OpenError> {
-    let bytes = std::fs::read(path).map_err(|source| OpenError::Read { path: path.into(), source })?;
+    let unreadable = |source| OpenError::Read { path: path.into(), source };
+    let mut file = File::open(path).map_err(unreadable)?;
+    let length = file.metadata().map_err(unreadable)?.len();
+    let mut bytes = Vec::new();
+    file.by_ref().take(BEGINNING).read_to_end(&mut bytes).map_err(unreadable)?;
+    if Format::of_beginning(&bytes, length) == Some(Format::Stl) && stl::is_exact_binary(&bytes, length) {
+        let mut report = ImportReport::default();
+        let mesh = stl::read_binary(bytes.chain(file), length, &mut report).map_err(unreadable)?;
+        return discrete::of_stl(mesh, report).map_err(|source| OpenError::Discrete {
+            path: path.into(),
+            format: Format::Stl,
+            source,
+        });
+    }
+    file.read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.is_empty() {
         return Err(OpenError::Empty { path: path.into() });
     }

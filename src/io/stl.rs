@@ -4,28 +4,31 @@
 //! binary files begin with `solid`); else ASCII when its beginning is text that speaks of facets, whether or not it
 //! begins with `solid`; else it is read as binary up to its last whole triangle, with a warning. Solids keep their names as groups. Equal corners become one vertex.
 
+use std::io::Read;
+
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::report::{ImportReport, Severity};
 use crate::kernel::mesh::tri_mesh::{Group, TriMesh};
-use crate::kernel::mesh::weld::{Welder, weld};
+use crate::kernel::mesh::weld::Welder;
 
 const HEADER: usize = 84;
 const RECORD: usize = 50;
+/// Triangles that are read at a time.
+const BATCH: usize = 1 << 14;
 
-/// Whether these bytes are an STL file.
-pub fn looks_like(bytes: &[u8]) -> bool {
-    is_exact_binary(bytes) || is_ascii(bytes)
+/// Whether a file of this length that begins like this is an STL file.
+pub fn looks_like(beginning: &[u8], length: u64) -> bool {
+    is_exact_binary(beginning, length) || is_ascii(beginning)
 }
 
 fn declared_count(bytes: &[u8]) -> Option<usize> {
     bytes.get(80..HEADER).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize)
 }
 
-fn is_exact_binary(bytes: &[u8]) -> bool {
-    declared_count(bytes)
-        .is_some_and(|n| n > 0 && Some(bytes.len()) == n.checked_mul(RECORD).and_then(|b| b.checked_add(HEADER)))
+/// Whether a file of this length that begins like this is binary and whole.
+pub fn is_exact_binary(beginning: &[u8], length: u64) -> bool {
+    declared_count(beginning).is_some_and(|n| n > 0 && length == n as u64 * RECORD as u64 + HEADER as u64)
 }
 
 fn starts_with_word(bytes: &[u8], word: &str) -> bool {
@@ -46,7 +49,15 @@ fn contains_word(bytes: &[u8], word: &str) -> bool {
 
 /// Reads a mesh; what had to be left out is in the report.
 pub fn read(bytes: &[u8], report: &mut ImportReport) -> TriMesh {
-    if !is_exact_binary(bytes) && is_ascii(bytes) { read_ascii(bytes, report) } else { read_binary(bytes, report) }
+    let length = bytes.len() as u64;
+    if !is_exact_binary(bytes, length) && is_ascii(bytes) {
+        return read_ascii(bytes, report);
+    }
+    read_binary(bytes, length, report).unwrap_or_else(|error| {
+        // Not reached: bytes in memory are always there.
+        report.add(Severity::Skipped, "STL", None, None, error.to_string());
+        TriMesh::default()
+    })
 }
 
 const NOT_FINITE: &str = "with a coordinate that is not a finite number";
@@ -63,6 +74,8 @@ fn skipped(report: &mut ImportReport, count: usize, why: &str) {
 struct Gatherer {
     welder: Welder,
     triangles: Vec<[u32; 3]>,
+    /// Space for the vertices of one batch.
+    numbers: Vec<u32>,
     groups: Vec<Group>,
     not_finite: usize,
     collapsed: usize,
@@ -74,6 +87,7 @@ impl Gatherer {
         Self {
             welder: Welder::with_capacity(triangles / 2 + 16),
             triangles: Vec::with_capacity(triangles),
+            numbers: Vec::new(),
             groups: Vec::new(),
             not_finite: 0,
             collapsed: 0,
@@ -95,6 +109,28 @@ impl Gatherer {
         }
     }
 
+    /// Adds triangles by their corners, three after three. `None` when their vertices cannot be numbered.
+    fn add_all(&mut self, corners: &[DVec3]) -> Option<()> {
+        self.numbers.clear();
+        if corners.iter().all(|p| p.is_finite()) {
+            self.welder.vertices(corners, &mut self.numbers)?;
+        } else {
+            let whole = corners.chunks_exact(3).filter(|c| c.iter().all(|p| p.is_finite()));
+            let finite: Vec<DVec3> = whole.flatten().copied().collect();
+            self.not_finite += (corners.len() - finite.len()) / 3;
+            self.welder.vertices(&finite, &mut self.numbers)?;
+        }
+        for corners in self.numbers.as_chunks().0 {
+            let &[a, b, c] = corners;
+            if a == b || b == c || c == a {
+                self.collapsed += 1;
+            } else {
+                self.triangles.push(*corners);
+            }
+        }
+        Some(())
+    }
+
     fn end_group(&mut self, name: String) {
         let start = self.groups.last().map_or(0, |g| g.triangles.end);
         self.groups.push(Group { name, triangles: start..self.triangles.len() });
@@ -109,49 +145,48 @@ impl Gatherer {
     }
 }
 
-fn read_binary(bytes: &[u8], report: &mut ImportReport) -> TriMesh {
-    let declared = declared_count(bytes).unwrap_or(0);
-    let body = bytes.get(HEADER..).unwrap_or_default();
-    let there = body.len() / RECORD;
-    if declared != there || body.len() % RECORD != 0 {
+/// Reads a binary file of this length, of which no more than two batches are in memory: while one is welded, the next one
+/// is read and decoded.
+pub fn read_binary(mut from: impl Read + Send, length: u64, report: &mut ImportReport) -> std::io::Result<TriMesh> {
+    let mut header = [0_u8; HEADER];
+    let header = &mut header[..HEADER.min(length as usize)];
+    from.read_exact(header)?;
+    let declared = declared_count(header).unwrap_or(0);
+    let body = length.saturating_sub(HEADER as u64);
+    let there = (body / RECORD as u64) as usize;
+    if declared != there || !body.is_multiple_of(RECORD as u64) {
         let reason =
             format!("the file declares {declared} triangles and holds {there}; those that are there were read");
         report.add(Severity::Warning, "STL header", None, None, reason);
     }
-    let records: Vec<&[u8]> = body.chunks_exact(RECORD).take(declared).collect();
-    let corner = |record: &[u8], k: usize| {
-        let float = |at: usize| {
-            let four = record.get(at..at + 4).and_then(|b| b.try_into().ok()).unwrap_or([0xFF; 4]);
-            f64::from(f32::from_le_bytes(four))
-        };
-        DVec3::new(float(12 + 12 * k), float(16 + 12 * k), float(20 + 12 * k))
+    let mut left = declared.min(there);
+    let mut gatherer = Gatherer::new(left);
+    let (mut records, mut next, mut corners) = (Vec::new(), Vec::new(), Vec::new());
+    let mut read = |left: &mut usize, records: &mut Vec<u8>, corners: &mut Vec<DVec3>| {
+        let count = BATCH.min(*left);
+        *left -= count;
+        records.resize(count * RECORD, 0);
+        from.read_exact(records)?;
+        corners.clear();
+        corners.extend(records.as_chunks::<RECORD>().0.iter().flat_map(|record| {
+            let float = |at: usize| f64::from(f32::from_le_bytes([0, 1, 2, 3].map(|k| record[at + k])));
+            [12, 24, 36].map(|at| DVec3::new(float(at), float(at + 4), float(at + 8)))
+        }));
+        std::io::Result::Ok(())
     };
-    let whole = |record: &&[u8]| (0..3).all(|k| corner(record, k).is_finite());
-    let usable: Vec<&[u8]> = if records.par_iter().all(whole) {
-        records
-    } else {
-        let usable: Vec<&[u8]> = records.par_iter().copied().filter(|r| whole(r)).collect();
-        skipped(report, records.len() - usable.len(), NOT_FINITE);
-        usable
-    };
-    let Some((points, corners)) = weld(3 * usable.len(), |k| corner(usable[k / 3], k % 3)) else {
-        report.add(Severity::Skipped, "STL", None, None, "it has more corners than can be numbered (2^32)");
-        return TriMesh::default();
-    };
-    let count = usable.len();
-    drop(usable);
-    let triangles: Vec<[u32; 3]> = corners
-        .par_chunks_exact(3)
-        .map(|c| [c[0], c[1], c[2]])
-        .filter(|[a, b, c]| a != b && b != c && c != a)
-        .collect();
-    skipped(report, count - triangles.len(), COLLAPSED);
-    let name = String::from_utf8_lossy(&bytes[..bytes.len().min(80)]);
-    let name = name.trim_matches(|c: char| c.is_whitespace() || c == '\0').to_owned();
-    let groups = vec![(name, 0, triangles.len())];
-    let mut mesh = TriMesh::new(points, triangles).unwrap_or_default();
-    mesh.set_groups(groups);
-    mesh
+    read(&mut left, &mut records, &mut corners)?;
+    while !corners.is_empty() {
+        let (welded, done) = rayon::join(|| gatherer.add_all(&corners), || read(&mut left, &mut records, &mut next));
+        done?;
+        if welded.is_none() {
+            report.add(Severity::Skipped, "STL", None, None, "it has more vertices than can be numbered (2^32)");
+            break;
+        }
+        std::mem::swap(&mut corners, &mut next);
+    }
+    let name = String::from_utf8_lossy(&header[..header.len().min(80)]);
+    gatherer.end_group(name.trim_matches(|c: char| c.is_whitespace() || c == '\0').to_owned());
+    Ok(gatherer.finish(report))
 }
 
 fn read_ascii(bytes: &[u8], report: &mut ImportReport) -> TriMesh {
@@ -273,7 +308,7 @@ mod tests {
     fn binary_is_recognised_even_when_its_header_says_solid() {
         let mut bytes = write_binary(&tetrahedron());
         bytes[..16].copy_from_slice(b"solid facet oops");
-        assert!(looks_like(&bytes));
+        assert!(looks_like(&bytes, bytes.len() as u64));
         let (back, report) = reread(&bytes);
         assert_same(&tetrahedron(), &back, 1e-7);
         assert!(report.lines.is_empty());

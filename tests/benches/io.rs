@@ -2,18 +2,18 @@
 //! trimmed faces needs until its first picture, against 1.5 s and 30 times its size.
 
 #![allow(clippy::unwrap_used, missing_docs, reason = "a benchmark may stop at a broken file")]
-#![allow(unsafe_code, reason = "measuring memory needs an allocator, which is an unsafe trait")]
 
 #[path = "../support/iges_text.rs"]
 mod iges_text;
+#[path = "../support/memory.rs"]
+mod memory;
 
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::hint::black_box;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicIsize, Ordering::Relaxed};
 use std::time::{Duration, Instant, SystemTime};
 
 use glam::DVec3;
+use memory::memory;
 use patchwright::io::iges::{self, IgesOptions};
 use patchwright::io::project;
 use patchwright::kernel::geom::{Knots, Surface};
@@ -21,39 +21,6 @@ use patchwright::model::document::{Document, Shape, Unit};
 use patchwright::view::camera::Camera;
 use patchwright::view::scene::Scene;
 use patchwright::view::viewport::{View, Viewport};
-
-/// Counts the bytes that are held, on all threads.
-struct Counting;
-
-static HELD: AtomicIsize = AtomicIsize::new(0);
-static PEAK: AtomicIsize = AtomicIsize::new(0);
-
-// SAFETY: every call is passed on unchanged to the system's allocator.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let held = HELD.fetch_add(layout.size() as isize, Relaxed) + layout.size() as isize;
-        PEAK.fetch_max(held, Relaxed);
-        // SAFETY: the caller keeps the contract of `alloc`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        HELD.fetch_sub(layout.size() as isize, Relaxed);
-        // SAFETY: the pointer came from `alloc` above, hence from the system.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-/// Runs `f` and gives the most bytes that it held at once, and those it still holds.
-fn memory<T>(f: impl FnOnce() -> T) -> (T, f64, f64) {
-    let before = HELD.load(Relaxed);
-    PEAK.store(before, Relaxed);
-    let result = f();
-    (result, (PEAK.load(Relaxed) - before) as f64, (HELD.load(Relaxed) - before) as f64)
-}
 
 /// 300 trimmed bicubic patches, each with a wavy outline and a round hole, as curves in space.
 fn trimmed_faces() -> String {

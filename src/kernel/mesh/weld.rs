@@ -1,80 +1,14 @@
 //! Welding: a soup of triangle corners becomes an indexed mesh by giving equal corners one vertex.
 //!
 //! Equal means equal coordinates, bit for bit but for the sign of zero; a tolerance would move geometry. One
-//! open-addressing table, linear in the number of corners; the vertices come in the order in which they first
-//! occur. [`Welder`] takes corners one by one; [`weld`] takes all at once, sorts them by hash into buckets whose tables
-//! fit into the cache, and works on several threads with the same result.
-
-use std::sync::atomic::{AtomicU32, Ordering};
+//! open-addressing table of `u32`, linear in the number of corners; the vertices come in the order in which they first
+//! occur. Corners come one by one, or in batches whose memory accesses overlap: first all table entries of a batch are
+//! fetched, then the points that they name are compared.
 
 use glam::DVec3;
-use rayon::prelude::*;
 
-/// Corners that one task of [`weld`] sorts.
-const CHUNK: usize = 1 << 18;
-/// Buckets of [`weld`], as a power of two.
-const BUCKET_BITS: u32 = 8;
-
-/// Gives equal corners `at(0) .. at(count - 1)` one vertex: the vertices in the order in which they first occur, and the
-/// vertex of every corner. All corners must be finite. `None` when `u32` cannot number them.
-pub fn weld(count: usize, at: impl Fn(usize) -> DVec3 + Sync) -> Option<(Vec<DVec3>, Vec<u32>)> {
-    if u32::try_from(count).is_err() {
-        return None;
-    }
-    let chunks = count.div_ceil(CHUNK);
-    let range = |chunk: usize| chunk * CHUNK..((chunk + 1) * CHUNK).min(count);
-    // Corners by bucket, chunk by chunk, each in increasing order.
-    let sorted: Vec<Vec<Vec<u32>>> = (0..chunks)
-        .into_par_iter()
-        .map(|chunk| {
-            let mut buckets = Vec::new();
-            buckets.resize_with(1 << BUCKET_BITS, || Vec::with_capacity(CHUNK >> (BUCKET_BITS - 1)));
-            for k in range(chunk) {
-                buckets[(hash(at(k) + DVec3::ZERO) >> (64 - BUCKET_BITS)) as usize].push(k as u32);
-            }
-            buckets
-        })
-        .collect();
-    // The first corner that is equal to each.
-    let first: Vec<AtomicU32> = (0..count).into_par_iter().map(|_| AtomicU32::new(0)).collect();
-    (0..1_usize << BUCKET_BITS).into_par_iter().for_each(|bucket| {
-        let inside: usize = sorted.iter().map(|chunk| chunk[bucket].len()).sum();
-        let mut table: Vec<(u32, DVec3)> = vec![(u32::MAX, DVec3::ZERO); (2 * inside.max(4)).next_power_of_two()];
-        let mask = table.len() - 1;
-        for &k in sorted.iter().flat_map(|chunk| &chunk[bucket]) {
-            let p = at(k as usize) + DVec3::ZERO; // -0 becomes 0
-            let mut slot = hash(p) as usize & mask;
-            let found = loop {
-                let (leader, other) = table[slot];
-                if leader == u32::MAX {
-                    table[slot] = (k, p);
-                    break k;
-                }
-                if other == p {
-                    break leader;
-                }
-                slot = (slot + 1) & mask;
-            };
-            first[k as usize].store(found, Ordering::Relaxed);
-        }
-    });
-    drop(sorted);
-    let first = |k: usize| first[k].load(Ordering::Relaxed);
-    let mut number = vec![0_u32; count];
-    let mut vertices = 0;
-    for (k, number) in number.iter_mut().enumerate() {
-        if first(k) as usize == k {
-            *number = vertices;
-            vertices += 1;
-        }
-    }
-    let points: Vec<Vec<DVec3>> = (0..chunks)
-        .into_par_iter()
-        .map(|chunk| range(chunk).filter(|&k| first(k) as usize == k).map(|k| at(k) + DVec3::ZERO).collect())
-        .collect();
-    let of_corner = (0..count).into_par_iter().map(|k| number[first(k) as usize]).collect();
-    Some((points.concat(), of_corner))
-}
+/// Corners whose table entries are fetched together.
+const BATCH: usize = 64;
 
 /// Collects corners and numbers them.
 #[derive(Clone, Debug)]
@@ -112,6 +46,25 @@ impl Welder {
         }
     }
 
+    /// Appends the numbers of many corners to `out`, as [`Self::vertex`] would give them one by one. `None` when `u32`
+    /// cannot number any more.
+    pub fn vertices(&mut self, corners: &[DVec3], out: &mut Vec<u32>) -> Option<()> {
+        let mut guess = [0_u32; BATCH];
+        for batch in corners.chunks(BATCH) {
+            let mask = self.table.len() - 1;
+            for (guess, &p) in guess.iter_mut().zip(batch) {
+                *guess = self.table[hash(p + DVec3::ZERO) as usize & mask];
+            }
+            for (&guess, &p) in guess.iter().zip(batch) {
+                match guess.checked_sub(1) {
+                    Some(k) if self.points[k as usize] == p => out.push(k),
+                    _ => out.push(self.vertex(p)?),
+                }
+            }
+        }
+        Some(())
+    }
+
     fn grow(&mut self) {
         let length = 2 * self.table.len();
         self.table = vec![0; length];
@@ -143,15 +96,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_at_once_is_the_same_as_one_by_one() {
+    fn batches_are_the_same_as_one_by_one() {
         let at = |k: usize| DVec3::new((k * 7919 % 301) as f64, (k % 17) as f64 - 8.0, -0.0);
-        let count = 2 * CHUNK + 77;
-        let (points, corners) = weld(count, at).unwrap();
-        let mut welder = Welder::with_capacity(16);
-        let slow: Vec<u32> = (0..count).map(|k| welder.vertex(at(k)).unwrap()).collect();
-        assert_eq!(corners, slow);
-        assert_eq!(points, welder.into_points());
-        assert_eq!(weld(0, at), Some((vec![], vec![])));
+        let corners: Vec<DVec3> = (0..20_077).map(at).collect();
+        let (mut batches, mut one_by_one) = (Welder::with_capacity(16), Welder::with_capacity(16));
+        let mut numbers = Vec::new();
+        for part in corners.chunks(1000) {
+            batches.vertices(part, &mut numbers).unwrap();
+        }
+        let slow: Vec<u32> = corners.iter().map(|&p| one_by_one.vertex(p).unwrap()).collect();
+        assert_eq!(numbers, slow);
+        assert_eq!(batches.into_points(), one_by_one.into_points());
     }
 
     #[test]
