@@ -102,11 +102,8 @@ fn both_engines_agree_on_every_transversal_case() {
         println!("skipped: no shared data");
         return;
     };
-    let mut names: Vec<String> = folder
-        .filter_map(|e| Some(e.ok()?.file_name().to_str()?.strip_suffix(".oracle.json")?.to_owned()))
-        // The 17 x 17 cases take long in this profile; one of them is compared with its oracle above.
-        .filter(|n| !n.starts_with("graph_17x17"))
-        .collect();
+    let mut names: Vec<String> =
+        folder.filter_map(|e| Some(e.ok()?.file_name().to_str()?.strip_suffix(".oracle.json")?.to_owned())).collect();
     names.sort();
     let mut compared = 0;
     for name in names {
@@ -133,18 +130,21 @@ fn both_engines_agree_on_every_transversal_case() {
         let tol = (mesh.tol + exact.tol) / points.map(steep).fold(1.0, f64::min);
         let off = [apart(&mesh, &exact), apart(&exact, &mesh)];
         println!(
-            "{name}: {} curves, {} loops, {:.1e} and {:.1e} apart ({:.1e} allowed), {} pairs handed over",
+            "{name}: {} curves, {} loops, {:.1e} and {:.1e} apart ({:.1e} allowed), handed over: {:?}",
             mesh.curves.len(),
             loops(&mesh),
             off[0],
             off[1],
             tol,
-            job.warnings().len()
+            job.warnings()
         );
+        // Two surfaces that almost overlap come near everywhere; no other pair goes over as a whole.
+        let whole = job.warnings().iter().any(|w| w.contains("as a whole"));
+        assert!(!whole || name == "almost_overlap_scale0.0001", "{name}: {:?}", job.warnings());
         assert_eq!((mesh.curves.len(), loops(&mesh)), (exact.curves.len(), loops(&exact)), "{name}");
         assert!(mesh.complete && exact.complete, "{name}: {:?}", mesh.unresolved);
         assert!(off[0] <= tol && off[1] <= tol, "{name}: {off:?}");
         compared += 1;
     }
-    assert!(compared >= 5, "{compared} cases");
+    assert!(compared >= 13, "{compared} cases");
 }

@@ -1,9 +1,11 @@
 //! The whole of HJR99 section 4: triangulate, intersect the trees, trace, refine on the parametric sides, insert
 //! and delete points to meet the tolerance. The answer has the form of the hybrid engine's.
 //!
-//! A pair of surfaces that come near with agreeing normals (see [`super::near`]), or of which a point cannot be refined
-//! because they do, is handed over to the hybrid engine as a whole, with a warning that says so: there the triangles
-//! decide nothing. On the other pairs of surfaces the topology is that of the triangles. A mesh or block is its own truth:
+//! Places at which two surfaces come near with agreeing normals (see [`super::near`]) are handed over to the hybrid engine,
+//! which intersects the first surface restricted to each of them with the second one, and the curves of both engines are
+//! joined at the borders of the places ([`super::places`]); a warning says so. There the triangles decide nothing, elsewhere
+//! the topology is theirs. A pair goes over as a whole where the places are most of the surface, where a point outside them
+//! cannot be refined, or where the curves do not join. A mesh or block is its own truth:
 //! against one, a point is refined on the surface's side only, along the edge of the mesh on which it lies or in the
 //! plane of the triangle. `error_bound` is measured at the middle of every chord, on both sides.
 //!
@@ -15,7 +17,8 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::join::join;
-use super::near::near_agreement;
+use super::near::{Place, near_places};
+use super::places::{self, Step};
 use super::refine::{Refined, Sheet as Touch, TANGENTIAL, refine};
 use super::sheet::Sheet;
 use super::topology::{Mesh, Point};
@@ -85,6 +88,7 @@ struct Common {
     /// The distance of the two surface points that counts as none.
     floor: f64,
     max_inserted: usize,
+    diagonal: f64,
 }
 
 /// Intersects all bodies of one side with all of the other; each comes with its number.
@@ -145,8 +149,8 @@ fn run(
     out.counts.nodes_built = sheets.iter().map(|s| s.tree().len()).sum();
     let near = |&[i, j]: &[usize; 2]| bodies[i].1.bounds().grown(2.0 * chord_tol).overlaps(&bodies[j].1.bounds());
     pairs.retain(near);
-    let common =
-        Common { tol, chord_tol, floor: 1e-14 * (diagonal + bounds.max_abs()), max_inserted: options.max_inserted };
+    let floor = 1e-14 * (diagonal + bounds.max_abs());
+    let common = Common { tol, chord_tol, floor, max_inserted: options.max_inserted, diagonal };
     job.phase("Intersecting triangles");
     let done = std::sync::atomic::AtomicUsize::new(0);
     let found: Vec<(Intersection, Option<String>)> = pairs
@@ -198,61 +202,146 @@ impl Pair<'_> {
             return (Intersection::default(), None);
         }
         let start = Instant::now();
-        let why = match near_agreement(sa, sb, 2.0 * self.common.chord_tol, job) {
-            Some([t, _]) => Some(format!("come near with agreeing normals at {}", sa.plane(t).0)),
-            None => {
+        let near = near_places(sa, sb, 2.0 * self.common.chord_tol, job);
+        let mut note = None;
+        let why = match &near {
+            None => Some("come near with agreeing normals over most of the first one".to_owned()),
+            Some(places) => {
                 let found = intersect(sa.triangles(), sa.tree(), sb.triangles(), sb.tree(), job);
                 out.time_ms.traverse = start.elapsed().as_secs_f64() * 1e3;
                 out.complete = found.complete;
                 out.counts.leaf_pairs = found.topology.segments.len();
+                let mut cuts = Vec::new();
                 for chain in &found.chains {
-                    self.finish(&found, chain, &mut out);
+                    self.finish(&found, chain, places, &mut out, &mut cuts);
                 }
-                out.unresolved.first().map(|u| format!("have a point that cannot be refined ({})", u.reason))
+                let unrefined =
+                    out.unresolved.first().map(|u| format!("have a point that cannot be refined ({})", u.reason));
+                match (unrefined, sa.surface(), sb.surface()) {
+                    (None, Some(a), Some(b)) if !places.is_empty() => {
+                        let joined = self.with_places(std::mem::take(&mut out), &cuts, places, [a, b], job);
+                        let count = places.len();
+                        let what = if count == 1 { "at one place, which was" } else { "at places which were" };
+                        note = Some(format!(
+                            "surfaces {na} and {nb} come near with agreeing normals {what} handed over to the hybrid \
+                             engine ({count})"
+                        ));
+                        match joined {
+                            Some(joined) => {
+                                out = joined;
+                                None
+                            }
+                            None => Some("have curves that do not join where they come near".to_owned()),
+                        }
+                    }
+                    (unrefined, ..) => unrefined,
+                }
             }
         };
-        let mut note = None;
         if let (Some(why), Some(a), Some(b)) = (why, sa.surface(), sb.surface()) {
-            note = Some(format!("surfaces {na} and {nb} {why}: handed over to the hybrid engine"));
+            note = Some(format!("surfaces {na} and {nb} {why}: handed over to the hybrid engine as a whole"));
             out = handed_over([na, nb], a, b, self.common.tol, job);
         }
         out.time_ms.curves = start.elapsed().as_secs_f64() * 1e3 - out.time_ms.traverse;
         (out, note)
     }
 
-    /// A chain as a curve of the answer: refined, and as dense as the tolerance asks for.
-    fn finish(&self, found: &MeshIntersection, chain: &Chain, out: &mut Intersection) {
-        let mut points: Vec<CurvePoint> = Vec::with_capacity(chain.points.len());
-        let mut failed: Option<(CurvePoint, String)> = None;
-        for (k, &number) in chain.points.iter().enumerate() {
-            if chain.closed && k + 1 == chain.points.len() {
-                points.push(points[0]);
-                break;
-            }
-            let point = &found.topology.points[number as usize];
-            let segment = found.topology.segments[chain.segments[k.min(chain.segments.len() - 1)] as usize];
-            let start = self.start(point, segment.triangles);
-            let fixed = (point.uses.len() == 1).then(|| self.border(point)).flatten();
-            match self.at_point(start, point, segment.triangles, fixed) {
-                Ok(refined) => points.push(refined),
-                Err(reason) => {
-                    failed.get_or_insert((start, reason));
-                    points.push(start);
-                }
-            }
+    /// What was found outside the places with what the hybrid engine finds in them; `None` when it does not fit together.
+    fn with_places(
+        &self,
+        outer: Intersection,
+        cuts: &[[bool; 2]],
+        places: &[Place],
+        surfaces: [&Surface; 2],
+        job: &Job,
+    ) -> Option<Intersection> {
+        let [a, b] = surfaces;
+        let inner = places.iter().map(|place| {
+            let piece = a.restricted([place.low.x, place.high.x], [place.low.y, place.high.y]).ok()?;
+            Some(handed_over(self.numbers, &piece, b, self.common.tol, job))
+        });
+        let inner: Vec<Intersection> = inner.collect::<Option<_>>()?;
+        places::together(outer, cuts, inner, surfaces, self.common.tol, JOINING * self.common.diagonal)
+    }
+
+    /// A chain as a curve of the answer, or as several where it passes places that are handed over: refined, and as dense as
+    /// the tolerance asks for. `cuts`: which ends of each curve lie on the border of a place.
+    fn finish(
+        &self,
+        found: &MeshIntersection,
+        chain: &Chain,
+        places: &[Place],
+        out: &mut Intersection,
+        cuts: &mut Vec<[bool; 2]>,
+    ) {
+        let starts: Vec<CurvePoint> = (0..chain.points.len()).map(|k| self.start_at(found, chain, k)).collect();
+        let uv: Vec<DVec2> = starts.iter().map(|p| p.uv).collect();
+        for steps in places::outside(&uv, chain.closed, places) {
+            self.stretch(found, chain, &starts, &steps, places, out, cuts);
         }
-        let triangles: Vec<[u32; 2]> =
-            chain.segments.iter().map(|&s| found.topology.segments[s as usize].triangles).collect();
-        let (points, error_bound) = self.adapted(points, &triangles, chain.closed);
-        let end = |at: u32| match found.topology.points[at as usize].uses.len() {
-            1 => CurveEnd::Boundary,
-            _ => CurveEnd::Junction,
+    }
+
+    /// One stretch of a chain.
+    #[expect(clippy::too_many_arguments, reason = "a chain, its stretch, and where both go")]
+    fn stretch(
+        &self,
+        found: &MeshIntersection,
+        chain: &Chain,
+        starts: &[CurvePoint],
+        steps: &[Step],
+        places: &[Place],
+        out: &mut Intersection,
+        cuts: &mut Vec<[bool; 2]>,
+    ) {
+        let whole = steps.len() == chain.points.len() && steps.iter().all(|s| matches!(s, Step::Node(_)));
+        let closed = chain.closed && whole;
+        let mut points: Vec<CurvePoint> = Vec::with_capacity(steps.len());
+        let mut triangles: Vec<[u32; 2]> = Vec::with_capacity(steps.len());
+        let mut failed: Option<(CurvePoint, String)> = None;
+        let of_segment = |s: usize| found.topology.segments[chain.segments[s] as usize].triangles;
+        for (at, step) in steps.iter().enumerate() {
+            let made = match *step {
+                Step::Node(k) if closed && at + 1 == steps.len() => Ok((points[0], k - 1)),
+                Step::Node(k) => {
+                    let point = &found.topology.points[chain.points[k] as usize];
+                    let fixed = (point.uses.len() == 1).then(|| self.border(point)).flatten();
+                    let own = of_segment(k.min(chain.segments.len() - 1));
+                    let refined = self.at_point(starts[k], point, own, fixed).map_err(|reason| (starts[k], reason));
+                    // What moves into a place when it is refined is the other engine's.
+                    if refined.as_ref().is_ok_and(|p| places.iter().any(|place| place.contains(p.uv))) {
+                        continue;
+                    }
+                    refined.map(|p| (p, k.saturating_sub(1)))
+                }
+                Step::Cut { segment, t, fixed, value } => {
+                    let (p, q) = (starts[segment], starts[segment + 1]);
+                    let mut start =
+                        CurvePoint { xyz: p.xyz.lerp(q.xyz, t), uv: p.uv.lerp(q.uv, t), st: p.st.lerp(q.st, t), ..p };
+                    start.uv[fixed] = value;
+                    let cut = self.refined(start, of_segment(segment), Some((0, fixed)));
+                    cut.map(|p| (p, segment)).map_err(|reason| (start, reason))
+                }
+            };
+            // The triangles of the chord that ends here; a chord over several segments takes the last one's.
+            let (point, segment) = made.unwrap_or_else(|(start, reason)| {
+                failed.get_or_insert((start, reason));
+                (start, 0)
+            });
+            if !points.is_empty() {
+                triangles.push(of_segment(segment));
+            }
+            points.push(point);
+        }
+        if points.len() < 2 {
+            return;
+        }
+        let (points, error_bound) = self.adapted(points, &triangles, closed);
+        let cut = [steps.first(), steps.last()].map(|s| matches!(s, Some(Step::Cut { .. })));
+        let end = |e: usize| match steps[if e == 0 { 0 } else { steps.len() - 1 }] {
+            Step::Node(k) if found.topology.points[chain.points[k] as usize].uses.len() != 1 => CurveEnd::Junction,
+            _ => CurveEnd::Boundary,
         };
-        let ends = if chain.closed {
-            [CurveEnd::Loop; 2]
-        } else {
-            [end(chain.points[0]), end(chain.points[chain.points.len() - 1])]
-        };
+        let ends = if closed { [CurveEnd::Loop; 2] } else { [end(0), end(1)] };
         if failed.is_none() && error_bound > self.common.tol {
             let reason = format!("{} points were inserted and {error_bound:.3e} is left", self.common.max_inserted);
             failed = points.first().map(|p| (*p, reason));
@@ -273,13 +362,21 @@ impl Pair<'_> {
         }
         out.curves.push(IntersectionCurve {
             kind: CurveKind::Transversal,
-            closed: chain.closed,
+            closed,
             ends,
             end_ids,
             error_bound,
             region: None,
             points,
         });
+        cuts.push(cut);
+    }
+
+    /// A point of a chain with its parameters on both sides.
+    fn start_at(&self, found: &MeshIntersection, chain: &Chain, k: usize) -> CurvePoint {
+        let point = &found.topology.points[chain.points[k] as usize];
+        let segment = chain.segments[k.min(chain.segments.len() - 1)];
+        self.start(point, found.topology.segments[segment as usize].triangles)
     }
 
     /// A point of the triangulations with its parameters on both sides.

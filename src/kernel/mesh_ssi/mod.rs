@@ -6,6 +6,7 @@ pub mod engine;
 pub mod join;
 pub mod near;
 pub mod perturbed;
+pub mod places;
 pub mod refine;
 pub mod sheet;
 pub mod topology;

@@ -4,7 +4,8 @@
 //! HJR99 section 4: critical points, "where the normals of both intersecting surfaces are exactly or nearly collinear",
 //! are where the intersection of triangulations "may not accurately reflect the intersection of the underlying
 //! surfaces". Every closed curve that is too small for the triangles encloses such a point (Sederberg et al.), and
-//! every junction is one, so a pair of surfaces without any is one whose topology the triangles get right.
+//! every junction is one, so away from such places the topology of the triangles is that of the surfaces. The places are
+//! rectangles of one surface, which the hybrid engine then intersects on its own (see [`super::places`]).
 
 use glam::{DVec2, DVec3};
 
@@ -14,6 +15,12 @@ use crate::kernel::job::Job;
 
 /// How often the triangles of a pair are quartered to see whether their normals really agree.
 const QUARTERED: usize = 3;
+
+/// The room around a triangle that belongs to its place, as a part of its extent: not a whole one, so that the border of a
+/// place does not run along grid lines.
+const ROOM: f64 = 0.73;
+/// From this part of the first surface on the places are no longer told apart.
+const MOST: f64 = 0.5;
 
 /// A triangle of a surface with what the surface has at its corners.
 #[derive(Clone, Copy)]
@@ -78,14 +85,67 @@ fn search(surfaces: [&Surface; 2], a: &Cell, b: &Cell, margin: f64, left: usize)
     parts.iter().any(|p| others.iter().any(|q| search(surfaces, p, q, margin, left - 1)))
 }
 
-/// The first pair of triangles of two surfaces that hold a place at which the surfaces are within `margin` of one another
-/// with normals that agree, as far as the triangles quartered [`QUARTERED`] times tell. Pairs come in the order of the
-/// trees.
-pub fn near_agreement(a: &Sheet, b: &Sheet, margin: f64, job: &Job) -> Option<[u32; 2]> {
-    let (Some(sa), Some(sb)) = (a.surface(), b.surface()) else { return None };
-    let pairs = a.tree().pairs_within(b.tree(), margin, job);
-    pairs.into_iter().find(|&[ta, tb]| {
-        let (p, q) = (Cell::new(sa, a.corner_uv(ta)), Cell::new(sb, b.corner_uv(tb)));
-        search([sa, sb], &p, &q, margin, QUARTERED)
-    })
+/// A rectangle of the first surface's parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Its lower corner.
+    pub low: DVec2,
+    /// Its upper corner.
+    pub high: DVec2,
+}
+
+impl Place {
+    fn overlaps(&self, other: &Self) -> bool {
+        self.low.cmple(other.high).all() && other.low.cmple(self.high).all()
+    }
+
+    /// Whether it holds these parameters.
+    pub fn contains(&self, uv: DVec2) -> bool {
+        self.low.cmple(uv).all() && uv.cmple(self.high).all()
+    }
+}
+
+/// The places at which two surfaces are within `margin` of one another with normals that agree, as far as the triangles
+/// quartered [`QUARTERED`] times tell: disjoint rectangles of the first surface, each with room around its triangles.
+/// `None` where they are most of that surface, so that nothing is won by telling them apart.
+pub fn near_places(a: &Sheet, b: &Sheet, margin: f64, job: &Job) -> Option<Vec<Place>> {
+    let (Some(sa), Some(sb)) = (a.surface(), b.surface()) else { return Some(Vec::new()) };
+    let mut pairs = a.tree().pairs_within(b.tree(), margin, job);
+    pairs.sort_unstable();
+    let domain = sa.domain();
+    let [low, high] = [0, 1].map(|k| DVec2::new(domain[0][k], domain[1][k]));
+    let mut places: Vec<Place> = Vec::new();
+    for same in pairs.chunk_by(|p, q| p[0] == q[0]) {
+        let ta = same[0][0];
+        let corners = a.corner_uv(ta);
+        let p = Cell::new(sa, corners);
+        let held = |place: &Place| corners.iter().all(|&uv| place.contains(uv));
+        let agrees = |tb: u32| search([sa, sb], &p, &Cell::new(sb, b.corner_uv(tb)), margin, QUARTERED);
+        if places.iter().any(held) || !same.iter().any(|pair| agrees(pair[1])) {
+            continue;
+        }
+        let [from, to] = [corners[0].min(corners[1]).min(corners[2]), corners[0].max(corners[1]).max(corners[2])];
+        let room = ROOM * (to - from);
+        let mut place = Place { low: from - room, high: to + room };
+        // No slivers along the border.
+        for k in 0..2 {
+            if place.low[k] < low[k] + room[k] {
+                place.low[k] = low[k];
+            }
+            if place.high[k] > high[k] - room[k] {
+                place.high[k] = high[k];
+            }
+        }
+        while let Some(other) = places.iter().position(|other| other.overlaps(&place)) {
+            let other = places.swap_remove(other);
+            place = Place { low: place.low.min(other.low), high: place.high.max(other.high) };
+        }
+        places.push(place);
+        let area: f64 = places.iter().map(|p| (p.high - p.low).element_product()).sum();
+        if area > MOST * (high - low).element_product() {
+            return None;
+        }
+    }
+    places.sort_by(|p, q| p.low.x.total_cmp(&q.low.x).then(p.low.y.total_cmp(&q.low.y)));
+    Some(places)
 }
