@@ -306,3 +306,53 @@ fn exports_have_identical_shared_edges_and_say_the_largest_gap() {
         assert!(!folder.join("bad.xyz").exists());
     }
 }
+
+#[test]
+fn all_pairs_of_surfaces_and_a_mesh_are_intersected_and_written() {
+    let wall = |a: [f64; 2], b: [f64; 2]| {
+        let at = |p: [f64; 2], z: f64| DVec3::new(p[0], p[1], z);
+        Shape::Surface(Arc::new(Surface::bilinear([at(a, -1.0), at(b, -1.0), at(a, 1.5), at(b, 1.5)]).unwrap()))
+    };
+    let mut model = document(wall([1.1, -1.0], [1.1, 3.0]));
+    model.add("other", wall([-1.0, 0.9], [5.0, 0.9]), None);
+    model.add("hill", Shape::Mesh(Arc::new(Facets::of_mesh(hilly(20, [DVec2::splat(9.0); 2])))), None);
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    io::save(&folder.join("model.patchwright.ron"), &model, &io::SaveOptions::default()).unwrap();
+    // A mesh is among them, so that the engine is chosen; and asked for by name.
+    let run = |more: &[&str]| {
+        let output = patchwright(folder, &[&["intersect", "model.patchwright.ron", "--json", "-"], more].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        json(&output)
+    };
+    let chosen = run(&[]);
+    let named = run(&["--engine", "mesh", "--out", "curves.igs"]);
+    assert_eq!(chosen["curves"], named["curves"]);
+    let curves = named["curves"].as_array().unwrap();
+    let pairs: Vec<_> = curves.iter().map(|c| (c["points"][0]["a"].clone(), c["points"][0]["b"].clone())).collect();
+    assert_eq!(pairs, [(0.into(), 1.into()), (0.into(), 2.into()), (1.into(), 2.into())]);
+    // The three branches meet in one point, over (1.1, 0.9).
+    let junctions = named["junctions"].as_array().unwrap();
+    assert_eq!(junctions.len(), 1);
+    assert!((junctions[0]["xyz"][0].as_f64().unwrap() - 1.1).abs() < 1e-9);
+    assert!((junctions[0]["xyz"][1].as_f64().unwrap() - 0.9).abs() < 1e-9);
+    let written = io::open(&folder.join("curves.igs")).unwrap().document;
+    assert_eq!((written.curves().count(), written.surfaces().count()), (3, 2));
+    let degrees: Vec<usize> = written.curves().map(|(_, c)| c.knots().degree()).collect();
+    assert_eq!(degrees, [3, 1, 1], "splines between surfaces, polylines on the mesh");
+    for (_, curve) in written.curves() {
+        for k in 0..=64 {
+            let [from, to] = curve.domain();
+            let p = curve.eval(from + (to - from) * f64::from(k) / 64.0);
+            assert!((p.x - 1.1).abs().min((p.y - 0.9).abs()) < 1e-6, "{p}");
+        }
+    }
+    // Curves on surfaces, of two directory lines each: both sides of the first, one of each of the others.
+    let text = std::fs::read_to_string(folder.join("curves.igs")).unwrap();
+    let on_surfaces = text.lines().filter(|l| l.as_bytes()[72] == b'D' && l.trim_start().starts_with("142 ")).count();
+    assert_eq!(on_surfaces, 2 * 4);
+    // The exact engine says why it cannot.
+    let output = patchwright(folder, &["intersect", "model.patchwright.ron", "--engine", "bvh"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("use the mesh engine"));
+}

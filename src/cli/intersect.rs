@@ -4,11 +4,10 @@ use std::path::{Path, PathBuf};
 
 use super::{CliError, Common, Exit, ProgressLine, ranges};
 use crate::io::{self, Format, SaveOptions};
-use crate::kernel::geom::{Curve, Surface};
-use crate::kernel::intersect::{self, intersect_with};
+use crate::kernel::intersect::{self, intersect_every_pair, intersect_with};
 use crate::kernel::mesh::body::Body;
-use crate::kernel::ssi::{Intersection, SsiOptions, intersect_all};
-use crate::model::document::{Document, Shape};
+use crate::kernel::ssi::Intersection;
+use crate::model::document::Document;
 use crate::model::traces::traces_of;
 
 /// Arguments of `intersect`.
@@ -18,7 +17,7 @@ pub struct Args {
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
     /// The bodies of the first side, counted from 0 in file order: `0-3,5`; surfaces first, then meshes and blocks
-    /// [default, without --b: all pairs of surfaces]
+    /// [default, without --b: all pairs]
     #[arg(long, value_name = "LIST")]
     pub a: Option<String>,
     /// The bodies of the second side [default: all that are not in --a]
@@ -31,8 +30,8 @@ pub struct Args {
     /// How closely curves follow, in model units [default: 1e-6 of the diagonal]
     #[arg(long, value_name = "T")]
     pub tol: Option<f64>,
-    /// Write the curves to this file as cubic B-splines, with the surfaces that they run on; IGES also holds the curves
-    /// on these surfaces
+    /// Write the curves to this file as cubic B-splines (those on meshes and blocks as the polylines that they are), with
+    /// the surfaces that they run on; IGES also holds the curves on these surfaces
     #[arg(long, value_name = "CURVES")]
     pub out: Option<PathBuf>,
 }
@@ -70,57 +69,35 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         }
         (None, _) => None,
     };
-    let engine = match (args.engine, &sides) {
-        (Some(Engine::Mesh), None) => {
-            return Err(CliError::BadArguments(
-                "all pairs are found on the exact surfaces; give --a and --b for --engine mesh".into(),
-            ));
-        }
-        (Some(Engine::Bvh), _) | (None, None) => intersect::Engine::Bvh,
-        (Some(Engine::Mesh), _) => intersect::Engine::Mesh,
-        (None, Some((a, b))) => intersect::Engine::for_bodies(a.iter().chain(b).map(|(_, body)| body)),
+    let engine = match args.engine {
+        Some(Engine::Bvh) => intersect::Engine::Bvh,
+        Some(Engine::Mesh) => intersect::Engine::Mesh,
+        None => match &sides {
+            Some((a, b)) => intersect::Engine::for_bodies(a.iter().chain(b).map(|(_, body)| body)),
+            None => intersect::Engine::for_bodies(bodies.iter().map(|(_, body)| body)),
+        },
     };
     let job = super::job();
     let progress = ProgressLine::watch(&job);
     let result = match &sides {
-        Some((a, b)) => {
-            intersect_with(engine, a, b, args.tol, &job).map_err(|e| CliError::BadArguments(e.to_string()))?
-        }
-        None => {
-            let surfaces: Vec<_> = opened.document.surfaces().map(|(_, s)| s).collect();
-            let all: Vec<(usize, &Surface)> = surfaces.iter().map(|s| s.as_ref()).enumerate().collect();
-            if all.len() < bodies.len() {
-                job.warn(format!("{} meshes and blocks are left out of all pairs", bodies.len() - all.len()));
-            }
-            let options = SsiOptions { tol: args.tol, ..SsiOptions::default() };
-            intersect_all(&all, &options, &job).map_err(|e| CliError::BadArguments(e.to_string()))?
-        }
+        Some((a, b)) => intersect_with(engine, a, b, args.tol, &job),
+        None => intersect_every_pair(engine, &bodies, args.tol, &job),
     };
+    let result = result.map_err(|e| CliError::BadArguments(e.to_string()))?;
     drop(progress);
     for warning in job.warnings() {
         common.warn(warning);
     }
     tell(&result, common);
     if let Some(path) = &args.out {
-        write(path, &result, &opened.document, engine, common)?;
+        write(path, &result, &opened.document, common)?;
     }
     common.json(&result)?;
     Ok(if result.complete { Exit::Done } else { Exit::Incomplete })
 }
 
-/// Writes B-splines within the tolerance; on triangulations the polylines are the curves.
-fn write(
-    path: &Path,
-    result: &Intersection,
-    model: &Document,
-    engine: intersect::Engine,
-    common: &Common,
-) -> Result<(), CliError> {
-    if engine == intersect::Engine::Mesh {
-        let saved = io::save(path, &curves(result, model), &SaveOptions::default())?;
-        common.say(format!("{} curves written to {}", saved.entities, path.display()));
-        return Ok(());
-    }
+/// Writes the curves as B-splines within the tolerance, in space and on the surfaces.
+fn write(path: &Path, result: &Intersection, model: &Document, common: &Common) -> Result<(), CliError> {
     let fitted = traces_of(result, model, result.tol);
     for note in &fitted.notes {
         common.warn(note.clone());
@@ -166,16 +143,4 @@ fn tell(result: &Intersection, common: &Common) {
             place.a, place.uv_box, place.b, place.st_box, place.reason
         ));
     }
-}
-
-/// The curves as a document, polylines within the tolerance.
-fn curves(result: &Intersection, model: &Document) -> Document {
-    let mut document = Document::new(model.unit);
-    for (k, curve) in result.curves.iter().enumerate() {
-        let points: Vec<_> = curve.points.iter().map(|p| p.xyz).collect();
-        if let Ok(line) = Curve::polyline(&points) {
-            document.add(format!("intersection {k}"), Shape::Curve(line.into()), None);
-        }
-    }
-    document
 }

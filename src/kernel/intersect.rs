@@ -9,9 +9,9 @@ use std::sync::Arc;
 use super::geom::Surface;
 use super::job::Job;
 use super::mesh::body::Body;
-use super::mesh_ssi::engine::{MeshSsiError, MeshSsiOptions, intersect_bodies};
+use super::mesh_ssi::engine::{self, MeshSsiError, MeshSsiOptions, intersect_bodies};
 use super::ssi::clip::clip;
-use super::ssi::{Intersection, SsiError, SsiOptions};
+use super::ssi::{self, Intersection, SsiError, SsiOptions};
 
 /// Which engine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -59,18 +59,40 @@ pub fn intersect_with(
     let mut result = match engine {
         Engine::Bvh => {
             let (a, b) = (parametric(a)?, parametric(b)?);
-            super::ssi::intersect(&borrowed(&a), &borrowed(&b), &SsiOptions { tol, ..SsiOptions::default() }, job)?
+            ssi::intersect(&borrowed(&a), &borrowed(&b), &SsiOptions { tol, ..SsiOptions::default() }, job)?
         }
         Engine::Mesh => intersect_bodies(a, b, &MeshSsiOptions { tol, ..MeshSsiOptions::default() }, job)?,
     };
-    // Both engines work on whole surfaces.
-    clip(&mut result, &|number| {
-        a.iter().chain(b).find_map(|(n, body)| match body {
+    clip_to_faces(&mut result, a.iter().chain(b));
+    Ok(result)
+}
+
+/// Intersects every two of some bodies, each with its number, the one that comes first as `a`. `tol` as above.
+pub fn intersect_every_pair(
+    engine: Engine,
+    bodies: &[(usize, Body)],
+    tol: Option<f64>,
+    job: &Job,
+) -> Result<Intersection, IntersectError> {
+    let mut result = match engine {
+        Engine::Bvh => {
+            let surfaces = parametric(bodies)?;
+            ssi::intersect_all(&borrowed(&surfaces), &SsiOptions { tol, ..SsiOptions::default() }, job)?
+        }
+        Engine::Mesh => engine::intersect_all(bodies, &MeshSsiOptions { tol, ..MeshSsiOptions::default() }, job)?,
+    };
+    clip_to_faces(&mut result, bodies.iter());
+    Ok(result)
+}
+
+/// Both engines work on whole surfaces; of a face the part inside its loops counts.
+fn clip_to_faces<'a>(result: &mut Intersection, bodies: impl Iterator<Item = &'a (usize, Body)> + Clone) {
+    clip(result, &|number| {
+        bodies.clone().find_map(|(n, body)| match body {
             Body::Face(face) if *n == number => Some(Arc::clone(face)),
             _ => None,
         })
     });
-    Ok(result)
 }
 
 fn parametric(bodies: &[(usize, Body)]) -> Result<Vec<(usize, Arc<Surface>)>, IntersectError> {

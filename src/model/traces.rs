@@ -2,8 +2,11 @@
 
 use std::collections::BTreeSet;
 
+use glam::DVec3;
+
 use super::document::{Document, EntityId, Shape};
 use crate::kernel::geom::{Curve, Surface};
+use crate::kernel::ssi::result::{CurvePoint, IntersectionCurve};
 use crate::kernel::ssi::{Intersection, fit_splines};
 
 /// A curve on a surface: an intersection with another surface, in space and in the parameters.
@@ -33,8 +36,9 @@ pub struct Traces {
     pub notes: Vec<String>,
 }
 
-/// Fits cubic B-splines to all curves of an intersection of surfaces of `model`, numbered in their order there. `tol`
-/// is in model units.
+/// Fits cubic B-splines to all curves of an intersection of bodies of `model`, numbered in their order there: surfaces
+/// first, then meshes and blocks. A curve on a mesh or block is a polyline, with a corner at every edge of the mesh, and
+/// stays one, in space and in the parameters of the surface on the other side. `tol` is in model units.
 pub fn traces_of(result: &Intersection, model: &Document, tol: f64) -> Traces {
     let numbered: Vec<(EntityId, &Surface)> = model.surfaces().map(|(id, s)| (id, s.as_ref())).collect();
     let surfaces: Vec<(usize, &Surface)> = numbered.iter().map(|(_, s)| *s).enumerate().collect();
@@ -48,6 +52,23 @@ pub fn traces_of(result: &Intersection, model: &Document, tol: f64) -> Traces {
     document.retain(|e| used.contains(&e.id));
     let (mut curves, mut traces, mut notes, mut bound) = (Vec::new(), Vec::new(), Vec::new(), 0.0_f64);
     for (k, curve) in result.curves.iter().enumerate() {
+        if curve.points.iter().any(|p| p.a.max(p.b) >= numbered.len()) {
+            let Some((space, runs, off)) = polyline(curve, &surfaces) else {
+                notes.push(format!("intersection {k} was left out: it has no length"));
+                continue;
+            };
+            let off = off.max(curve.error_bound);
+            if off > tol {
+                notes.push(format!("intersection {k} follows within {off:.1e} only, not {tol:.1e}"));
+            }
+            bound = bound.max(off);
+            curves.push(document.add(format!("intersection {k}"), Shape::Curve(space.into()), None));
+            let on = |(number, in_surface, space): (usize, Curve, Curve)| {
+                numbered.get(number).map(|&(surface, _)| SurfaceTrace { surface, in_surface, space })
+            };
+            traces.extend(runs.into_iter().filter_map(on));
+            continue;
+        }
         let fit = match fit_splines(curve, &surfaces, tol) {
             Ok(fit) => fit,
             Err(error) => {
@@ -69,4 +90,37 @@ pub fn traces_of(result: &Intersection, model: &Document, tol: f64) -> Traces {
         }
     }
     Traces { document, curves, traces, bound, notes }
+}
+
+/// A curve as the polyline that it is, and for every stretch on one surface the number of that surface, the polyline in
+/// its parameters, and the stretch in space with the same parameter; and how far the two are apart at most, at the
+/// quarters of the chords. `None` where it has no length.
+fn polyline(
+    curve: &IntersectionCurve,
+    surfaces: &[(usize, &Surface)],
+) -> Option<(Curve, Vec<(usize, Curve, Curve)>, f64)> {
+    let all: Vec<DVec3> = curve.points.iter().map(|p| p.xyz).collect();
+    let space = Curve::polyline(&all).ok()?;
+    let (mut runs, mut off) = (Vec::new(), 0.0_f64);
+    for side in 0..2 {
+        let at = |p: &CurvePoint| if side == 0 { (p.a, p.uv) } else { (p.b, p.st) };
+        // A stretch ends where the curve passes to another surface, or over a seam: there the point is there twice.
+        let goes_on = |p: &CurvePoint, q: &CurvePoint| at(p).0 == at(q).0 && (p.xyz != q.xyz || at(p).1 == at(q).1);
+        for run in curve.points.chunk_by(goes_on) {
+            let Some(&(number, surface)) = surfaces.get(at(&run[0]).0) else { continue };
+            let mut points = run.to_vec();
+            points.dedup_by(|q, p| q.xyz == p.xyz);
+            let Ok(in_space) = Curve::polyline(&points.iter().map(|p| p.xyz).collect::<Vec<_>>()) else { continue };
+            let flat = points.iter().map(|p| at(p).1.extend(0.0)).collect();
+            let Ok(in_surface) = Curve::new(in_space.knots().clone(), flat, None) else { continue };
+            for pair in points.windows(2) {
+                for part in [0.25, 0.5, 0.75] {
+                    let uv = at(&pair[0]).1.lerp(at(&pair[1]).1, part);
+                    off = off.max(surface.eval(surface.clamped(uv)).distance(pair[0].xyz.lerp(pair[1].xyz, part)));
+                }
+            }
+            runs.push((number, in_surface, in_space));
+        }
+    }
+    Some((space, runs, off))
 }
