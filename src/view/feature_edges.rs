@@ -6,10 +6,13 @@
 //! neighbour gives a shared and a free stretch. A shared stretch whose normals turn by more than the feature angle is
 //! a feature edge; so is a crease inside a surface (a knot of full multiplicity). The seam of a closed surface is
 //! shared with itself. Poles are no edges. Normals are compared without their sign: neighbours in real files are
-//! not oriented alike.
+//! not oriented alike. The borders of meshes and blocks are looked at in the same way ([`rims`]), and meshes are
+//! neighbours as surfaces are.
 //!
 //! Cost: a closest point a sample and neighbour, some microseconds each; meant for a worker. A kind that shows at
 //! one sample only, between two that agree, is taken as chance (a surface that crosses there) and passed over.
+
+mod rims;
 
 use std::sync::Arc;
 
@@ -19,10 +22,10 @@ use rayon::prelude::*;
 use super::colormap::Rgb;
 use super::display::{CurveRef, Geometry};
 use crate::kernel::geom::trim::{EdgeRole, Sheet};
-use crate::kernel::geom::{Aabb, Direction, Side, Surface};
+use crate::kernel::geom::{Aabb, Direction, Side};
 use crate::kernel::job::Job;
-use crate::kernel::mesh::facets::{FacetCurveKind, Facets};
-use crate::kernel::mesh::surface_set::{Scratch, SurfaceSet};
+use crate::kernel::mesh::body::Body;
+use crate::kernel::mesh::surface_set::{OnSurface, Scratch, SurfaceSet};
 use crate::model::document::{Document, EntityId, Shape};
 
 /// What an edge is.
@@ -148,12 +151,37 @@ impl Edges {
     }
 }
 
+/// Something that borders can be near to.
 struct Part {
     id: EntityId,
-    sheet: Sheet,
-    surface: Arc<Surface>,
+    body: Body,
     bounds: Aabb,
-    set: SurfaceSet,
+    /// What finds closest points; `None` for a mesh that nothing is near to.
+    set: Option<SurfaceSet>,
+}
+
+impl Part {
+    fn new(id: EntityId, body: Body, bounds: Aabb, job: &Job) -> Self {
+        // Closest points are exact whatever the triangles; these only have to find the right place.
+        let chord = (2e-3 * bounds.diagonal()).max(f64::MIN_POSITIVE);
+        let set = Some(SurfaceSet::new(vec![(0, body.clone())], chord, job));
+        Self { id, body, bounds, set }
+    }
+
+    /// The nearest place within `limit`, with its normal.
+    fn closest(&self, p: DVec3, limit: f64, scratch: &mut Scratch) -> Option<(OnSurface, Option<DVec3>)> {
+        if self.bounds.distance_squared(p) > limit * limit {
+            return None;
+        }
+        let foot = self.set.as_ref()?.closest(p, limit, scratch)?;
+        let normal = match &self.body {
+            Body::Surface(surface) => surface.jet(foot.uv, 1).normal(),
+            Body::Face(face) => face.surface().jet(foot.uv, 1).normal(),
+            // Of a mesh the first parameter is the number of the triangle.
+            Body::Facets(facets) => facets.mesh().area_vector(foot.uv.x as usize).try_normalize(),
+        };
+        Some((foot, normal))
+    }
 }
 
 /// What is near a place of a border.
@@ -164,36 +192,67 @@ struct Near {
     angle: f64,
 }
 
+impl Near {
+    /// Adds a neighbour at a distance; the normals of the border's own body and of the neighbour where there are any.
+    fn meet(&mut self, id: EntityId, distance: f64, normals: [Option<DVec3>; 2]) {
+        self.neighbours.push(id);
+        self.gap = self.gap.max(distance);
+        if let [Some(a), Some(b)] = normals {
+            self.angle = self.angle.max(a.dot(b).abs().min(1.0).acos().to_degrees());
+        }
+    }
+
+    /// Adds those of other bodies that are near `p`.
+    fn meet_all(&mut self, p: DVec3, normal: Option<DVec3>, others: &[&Part], tol: f64, scratch: &mut Scratch) {
+        for part in others {
+            if let Some((foot, other)) = part.closest(p, tol, scratch) {
+                self.meet(part.id, foot.distance, [normal, other]);
+            }
+        }
+    }
+}
+
 /// Finds the edges of the original surfaces and free curves of a document.
 pub fn feature_edges(document: &Document, options: &EdgeOptions, job: &Job) -> Edges {
     job.phase("Finding edges");
-    let sheets: Vec<(EntityId, Sheet)> = document.sheets().collect();
-    // Closest points are exact whatever the triangles; these only have to find the right place.
-    let part = |(id, sheet): &(EntityId, Sheet)| {
-        let bounds = sheet.bounds();
-        let chord = (2e-3 * bounds.diagonal()).max(f64::MIN_POSITIVE);
-        let set = SurfaceSet::new(vec![(0, sheet.clone())], chord, job);
-        Part { id: *id, sheet: sheet.clone(), surface: Arc::clone(sheet.surface()), bounds, set }
+    let bodies: Vec<(EntityId, Body, Aabb)> =
+        document.bodies().map(|(id, body)| (id, body.clone(), body.bounds())).collect();
+    let reach = options.joining_tol;
+    let part = |(k, (id, body, bounds)): (usize, &(EntityId, Body, Aabb))| {
+        // The tree of a large mesh costs seconds, which are for nothing where nothing is near.
+        let others = bodies.iter().enumerate().filter(|(m, _)| *m != k);
+        let alone = !others.map(|(_, (.., other))| other).any(|other| other.grown(reach).overlaps(bounds));
+        match body {
+            Body::Facets(_) if alone => Part { id: *id, body: body.clone(), bounds: *bounds, set: None },
+            _ => Part::new(*id, body.clone(), *bounds, job),
+        }
     };
-    let parts: Vec<Part> = sheets.par_iter().map(part).collect();
+    let parts: Vec<Part> = bodies.par_iter().enumerate().map(part).collect();
     let done = std::sync::atomic::AtomicUsize::new(0);
-    let found: Vec<Vec<EdgePiece>> = (0..parts.len())
+    let surfaces = parts.iter().position(|p| matches!(p.body, Body::Facets(_))).unwrap_or(parts.len());
+    let found: Vec<Vec<EdgePiece>> = (0..surfaces)
         .into_par_iter()
         .map(|k| {
             let mut out = Vec::new();
-            for curve in borders_of(&parts[k]) {
-                if !job.is_cancelled() {
-                    border(&parts, k, curve, options, &mut out);
+            if let Some(sheet) = sheet_of(&parts[k].body) {
+                for curve in borders_of(&parts[k], &sheet) {
+                    if !job.is_cancelled() {
+                        border(&parts, k, &sheet, curve, options, &mut out);
+                    }
                 }
+                creases(parts[k].id, &sheet, options, &mut out);
             }
-            creases(&parts[k], options, &mut out);
             let done = 1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
             job.progress(done as f64 / parts.len() as f64);
             out
         })
         .collect();
     let mut pieces: Vec<EdgePiece> = found.into_iter().flatten().collect();
-    document.meshes().for_each(|(id, facets)| chains(id, facets, &mut pieces));
+    // One after the other: each is worked on by all threads.
+    for (k, part) in parts.iter().enumerate().skip(surfaces) {
+        rims::rims(&parts, part, options, job, &mut pieces);
+        job.progress((k + 1) as f64 / parts.len() as f64);
+    }
     for entity in document.entities() {
         if let Shape::Curve(curve) = &entity.shape {
             let (curve, range) = (CurveRef::Free(entity.id), curve.domain());
@@ -214,9 +273,17 @@ fn kind_of(near: &Near, options: &EdgeOptions) -> EdgeKind {
     }
 }
 
+fn sheet_of(body: &Body) -> Option<Sheet> {
+    match body {
+        Body::Surface(surface) => Some(Sheet::Whole(Arc::clone(surface))),
+        Body::Face(face) => Some(Sheet::Trimmed(Arc::clone(face))),
+        Body::Facets(_) => None,
+    }
+}
+
 /// The borders of a whole surface; the edges of a face, a seam once.
-fn borders_of(part: &Part) -> Vec<CurveRef> {
-    let Some(face) = part.sheet.face() else { return Side::ALL.map(|side| CurveRef::Border(part.id, side)).into() };
+fn borders_of(part: &Part, sheet: &Sheet) -> Vec<CurveRef> {
+    let Some(face) = sheet.face() else { return Side::ALL.map(|side| CurveRef::Border(part.id, side)).into() };
     let mut out = Vec::new();
     for (r, ring) in face.rings().iter().enumerate() {
         for (e, edge) in ring.edges.iter().enumerate() {
@@ -229,9 +296,10 @@ fn borders_of(part: &Part) -> Vec<CurveRef> {
     out
 }
 
-fn border(parts: &[Part], k: usize, curve: CurveRef, options: &EdgeOptions, out: &mut Vec<EdgePiece>) {
+fn border(parts: &[Part], k: usize, sheet: &Sheet, curve: CurveRef, options: &EdgeOptions, out: &mut Vec<EdgePiece>) {
     let own = &parts[k];
-    let geometry = match &own.sheet {
+    let surface = sheet.surface();
+    let geometry = match sheet {
         Sheet::Whole(surface) => Geometry::Surface(Arc::clone(surface)),
         Sheet::Trimmed(face) => Geometry::Face { face: Arc::clone(face), whole: false },
     };
@@ -239,6 +307,22 @@ fn border(parts: &[Part], k: usize, curve: CurveRef, options: &EdgeOptions, out:
     let mut breaks = vec![start];
     breaks.extend(geometry.curve_knots(&curve));
     breaks.push(end);
+    let places = places(&breaks, options);
+    let uv = |t: f64| geometry.curve_uv(&curve, t).unwrap_or(DVec2::ZERO);
+    let points: Vec<DVec3> = places.iter().map(|&t| surface.eval(surface.clamped(uv(t)))).collect();
+    let size = Aabb::of(points.iter().copied());
+    // A border that is shorter than what is joined is a pole.
+    if size.diagonal() <= options.joining_tol.min(1e-6 * own.bounds.diagonal()) {
+        return;
+    }
+    let others = near_to(parts, own, &size, options);
+    let mut scratch = Scratch::default();
+    let look = |t: f64| near(own, sheet, &curve, &others, uv(t), options, &mut scratch);
+    stretches(curve, [start, end], &places, look, options, out);
+}
+
+/// Where a border is looked at.
+fn places(breaks: &[f64], options: &EdgeOptions) -> Vec<f64> {
     let spans = breaks.len() - 1;
     let per_span = options.per_span.max(24_usize.div_ceil(spans)).min(512_usize.div_ceil(spans)).max(1);
     let mut places = Vec::new();
@@ -246,17 +330,24 @@ fn border(parts: &[Part], k: usize, curve: CurveRef, options: &EdgeOptions, out:
         let step = (pair[1] - pair[0]) / per_span as f64;
         places.extend((0..per_span).map(|i| pair[0] + step * (i as f64 + 0.5)));
     }
-    let uv = |t: f64| geometry.curve_uv(&curve, t).unwrap_or(DVec2::ZERO);
-    let points: Vec<DVec3> = places.iter().map(|&t| own.surface.eval(own.surface.clamped(uv(t)))).collect();
-    let size = Aabb::of(points.iter().copied());
-    // A border that is shorter than what is joined is a pole.
-    if size.diagonal() <= options.joining_tol.min(1e-6 * own.bounds.diagonal()) {
-        return;
-    }
+    places
+}
+
+/// The other bodies that may be near a border in this box.
+fn near_to<'p>(parts: &'p [Part], own: &Part, size: &Aabb, options: &EdgeOptions) -> Vec<&'p Part> {
     let reach = size.grown(options.joining_tol + 0.5 * size.diagonal());
-    let others: Vec<&Part> = parts.iter().filter(|p| p.id != own.id && p.bounds.overlaps(&reach)).collect();
-    let mut scratch = Scratch::default();
-    let mut look = |t: f64| near(own, &curve, &others, uv(t), options, &mut scratch);
+    parts.iter().filter(|p| p.id != own.id && p.bounds.overlaps(&reach)).collect()
+}
+
+/// Cuts a curve where what is near it changes.
+fn stretches(
+    curve: CurveRef,
+    [start, end]: [f64; 2],
+    places: &[f64],
+    mut look: impl FnMut(f64) -> Near,
+    options: &EdgeOptions,
+    out: &mut Vec<EdgePiece>,
+) {
     let mut seen: Vec<Near> = places.iter().map(|&t| look(t)).collect();
     let same = |a: &Near, b: &Near| a.neighbours == b.neighbours && kind_of(a, options) == kind_of(b, options);
     for i in 1..seen.len().saturating_sub(1) {
@@ -294,34 +385,29 @@ fn border(parts: &[Part], k: usize, curve: CurveRef, options: &EdgeOptions, out:
     }
 }
 
-/// The surfaces near a place of a border. `uv` is the place on the surface itself.
+/// The bodies near a place of a border. `uv` is the place on the surface itself.
 fn near(
     own: &Part,
+    sheet: &Sheet,
     curve: &CurveRef,
     others: &[&Part],
     uv: DVec2,
     options: &EdgeOptions,
     scratch: &mut Scratch,
 ) -> Near {
-    let jet = own.surface.jet(uv, 1);
+    let surface = sheet.surface();
+    let jet = surface.jet(uv, 1);
     let (p, normal) = (jet.p(), jet.normal());
     let mut out = Near::default();
-    let mut meet = |id: EntityId, distance: f64, other: Option<DVec3>| {
-        out.neighbours.push(id);
-        out.gap = out.gap.max(distance);
-        if let (Some(a), Some(b)) = (normal, other) {
-            out.angle = out.angle.max(a.dot(b).abs().min(1.0).acos().to_degrees());
-        }
-    };
     // The seam of a closed surface: the same parameter on the opposite border.
-    let [u, v] = own.surface.domain();
+    let [u, v] = surface.domain();
     let opposite = match curve {
         CurveRef::Border(_, Side::VMin) => Some(DVec2::new(uv.x, v[1])),
         CurveRef::Border(_, Side::VMax) => Some(DVec2::new(uv.x, v[0])),
         CurveRef::Border(_, Side::UMin) => Some(DVec2::new(u[1], uv.y)),
         CurveRef::Border(_, Side::UMax) => Some(DVec2::new(u[0], uv.y)),
         // A face runs its seam twice.
-        CurveRef::Edge(_, ring, edge) => own.sheet.face().and_then(|face| {
+        CurveRef::Edge(_, ring, edge) => sheet.face().and_then(|face| {
             let ring = face.rings().get(*ring as usize)?;
             let id = ring.edges.get(*edge as usize)?.id;
             (ring.edges.iter().filter(|e| e.id == id).count() > 1).then_some(uv)
@@ -329,43 +415,23 @@ fn near(
         _ => None,
     };
     if let Some(opposite) = opposite {
-        let across = own.surface.jet(opposite, 1);
+        let across = surface.jet(opposite, 1);
         if across.p().distance(p) <= options.joining_tol {
-            meet(own.id, across.p().distance(p), across.normal());
+            out.meet(own.id, across.p().distance(p), [normal, across.normal()]);
         }
     }
-    for part in others {
-        if part.bounds.distance_squared(p) > options.joining_tol * options.joining_tol {
-            continue;
-        }
-        if let Some(foot) = part.set.closest(p, options.joining_tol, scratch) {
-            meet(part.id, foot.distance, part.surface.jet(foot.uv, 1).normal());
-        }
-    }
+    out.meet_all(p, normal, others, options.joining_tol, scratch);
     out
 }
 
-/// The borders and feature edges of a mesh, and the border lines of a block. Whether something else is near is not
-/// looked at: the triangles of a mesh say themselves which of its edges are shared.
-fn chains(id: EntityId, facets: &Facets, out: &mut Vec<EdgePiece>) {
-    for (k, chain) in facets.curves().iter().enumerate() {
-        let kind = match chain.kind {
-            FacetCurveKind::Border | FacetCurveKind::GridBorder => EdgeKind::Free,
-            FacetCurveKind::Feature => EdgeKind::Feature,
-            FacetCurveKind::GridLine => continue,
-        };
-        let (curve, range) = (CurveRef::Chain(id, k as u32), chain.curve.domain());
-        out.push(EdgePiece { curve, range, kind, neighbours: Vec::new(), max_gap: 0.0, max_angle: 0.0 });
-    }
-}
-
 /// Knots of full multiplicity at which the normal turns by more than the feature angle.
-fn creases(part: &Part, options: &EdgeOptions, out: &mut Vec<EdgePiece>) {
+fn creases(id: EntityId, sheet: &Sheet, options: &EdgeOptions, out: &mut Vec<EdgePiece>) {
+    let surface = sheet.surface();
     // The seam that a face was moved to is such a knot without being a crease; normals tell.
     for (k, fixed) in [Direction::U, Direction::V].into_iter().enumerate() {
-        let knots = &part.surface.knots()[k];
+        let knots = &surface.knots()[k];
         let [start, end] = knots.domain();
-        let along = part.surface.domain()[1 - k];
+        let along = surface.domain()[1 - k];
         for (t, multiplicity) in knots.multiplicities() {
             if multiplicity < knots.degree() || t <= start || t >= end {
                 continue;
@@ -375,7 +441,7 @@ fn creases(part: &Part, options: &EdgeOptions, out: &mut Vec<EdgePiece>) {
                 let s = along[0] + (along[1] - along[0]) * s;
                 if k == 0 { DVec2::new(t, s) } else { DVec2::new(s, t) }
             };
-            let normal = |t: f64, s: f64| part.surface.jet(place(t, s), 1).normal();
+            let normal = |t: f64, s: f64| surface.jet(place(t, s), 1).normal();
             let turns = (0..17).filter_map(|i| {
                 let s = (f64::from(i) + 0.5) / 17.0;
                 let (a, b) = (normal(t - step, s)?, normal(t + step, s)?);
@@ -383,12 +449,12 @@ fn creases(part: &Part, options: &EdgeOptions, out: &mut Vec<EdgePiece>) {
             });
             let turn = turns.fold(0.0, f64::max);
             if turn > options.feature_angle {
-                let stretches = part.sheet.face().map_or_else(|| vec![along], |face| face.stretches(k, t));
+                let stretches = sheet.face().map_or_else(|| vec![along], |face| face.stretches(k, t));
                 out.extend(stretches.into_iter().map(|range| EdgePiece {
-                    curve: CurveRef::Iso(part.id, fixed, t),
+                    curve: CurveRef::Iso(id, fixed, t),
                     range,
                     kind: EdgeKind::Feature,
-                    neighbours: vec![part.id],
+                    neighbours: vec![id],
                     max_gap: 0.0,
                     max_angle: turn,
                 }));
@@ -400,7 +466,7 @@ fn creases(part: &Part, options: &EdgeOptions, out: &mut Vec<EdgePiece>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernel::geom::{Curve, Knots};
+    use crate::kernel::geom::{Curve, Knots, Surface};
     use crate::model::document::Unit;
     use crate::view::display::tests::sphere;
 
@@ -500,6 +566,80 @@ mod tests {
         let (ids, found) = edges(vec![Shape::Surface(Arc::new(roof))], 1e-3);
         let piece = found.at(&CurveRef::Iso(ids[0], Direction::U, 1.0), 0.5).unwrap();
         assert!(piece.kind == EdgeKind::Feature && (piece.max_angle - 90.0).abs() < 1e-6);
+    }
+
+    /// A flat mesh of n x m squares over a rectangle at height z.
+    fn plate(x: [f64; 2], y: [f64; 2], z: f64, [n, m]: [usize; 2]) -> (Vec<DVec3>, Vec<[u32; 3]>) {
+        let at = |k: usize, n: usize, r: [f64; 2]| r[0] + (r[1] - r[0]) * k as f64 / n as f64;
+        let points = (0..(n + 1) * (m + 1)).map(|k| DVec3::new(at(k % (n + 1), n, x), at(k / (n + 1), m, y), z));
+        let index = |i: usize, j: usize| (j * (n + 1) + i) as u32;
+        let cells = (0..n * m).map(|k| (k % n, k / n));
+        let triangles = cells.flat_map(|(i, j)| {
+            let [a, b, c, d] = [index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)];
+            [[a, b, c], [a, c, d]]
+        });
+        (points.collect(), triangles.collect())
+    }
+
+    fn mesh(parts: &[(Vec<DVec3>, Vec<[u32; 3]>)]) -> Shape {
+        use crate::kernel::mesh::{facets::Facets, tri_mesh::TriMesh};
+        let (mut points, mut triangles) = (Vec::new(), Vec::new());
+        for (own, corners) in parts {
+            let base = points.len() as u32;
+            points.extend(own);
+            triangles.extend(corners.iter().map(|t| t.map(|k| k + base)));
+        }
+        Shape::Mesh(Arc::new(Facets::of_mesh(TriMesh::new(points, triangles).unwrap())))
+    }
+
+    /// The lengths of border of each kind in a model of curves of which every one is its own parameter range long.
+    fn lengths(found: &Edges, document: &Document, kind: EdgeKind) -> f64 {
+        let length = |p: &EdgePiece| {
+            let geometry = match &document.get(p.curve.entity()).unwrap().shape {
+                Shape::Mesh(f) => Geometry::Facets(Arc::clone(f)),
+                Shape::Surface(s) => Geometry::Surface(Arc::clone(s)),
+                _ => return 0.0,
+            };
+            let at = |t: f64| geometry.curve_jet(&p.curve, t).unwrap()[0];
+            at(p.range[0]).distance(at(p.range[1]))
+        };
+        found.pieces.iter().filter(|p| p.kind == kind).map(length).sum()
+    }
+
+    #[test]
+    fn borders_of_meshes_meet_meshes_and_surfaces_within_the_tolerance() {
+        let left = plate([0.0, 1.0], [0.0, 1.0], 0.0, [4, 4]);
+        for (z, kind) in [(0.0, EdgeKind::Shared), (5e-4, EdgeKind::Gap), (2e-3, EdgeKind::Free)] {
+            let right = plate([1.0, 2.0], [0.0, 1.0], z, [3, 7]);
+            let surface = rectangle([1.0, 2.0], [0.0, 1.0], [z, z]);
+            let one = vec![mesh(&[left.clone(), right.clone()])];
+            let two = vec![mesh(std::slice::from_ref(&left)), mesh(&[right])];
+            for shapes in [one, two, vec![surface, mesh(std::slice::from_ref(&left))]] {
+                let mut document = Document::new(Unit::Millimetre);
+                shapes.into_iter().for_each(|s| _ = document.add("s", s, None));
+                let found = feature_edges(&document, &EdgeOptions::new(1e-3), &Job::new());
+                let free = lengths(&found, &document, EdgeKind::Free);
+                let expected = if kind == EdgeKind::Free { 8.0 } else { 6.0 };
+                assert!((free - expected).abs() < 0.01, "{z}: {free} {:?}", found.pieces);
+                if kind != EdgeKind::Free {
+                    assert!((lengths(&found, &document, kind) - 2.0).abs() < 0.01, "{z}: {:?}", found.pieces);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn meshes_that_meet_at_an_angle_make_a_feature_edge_and_a_third_one_is_non_manifold() {
+        let flat = plate([0.0, 1.0], [0.0, 1.0], 0.0, [4, 4]);
+        let turned = |up: f64| {
+            let (points, triangles) = plate([0.0, 1.0], [0.0, 1.0], 0.0, [4, 3]);
+            (points.into_iter().map(|p| DVec3::new(1.0, p.y, up * p.x)).collect::<Vec<_>>(), triangles)
+        };
+        let (ids, found) = edges(vec![mesh(std::slice::from_ref(&flat)), mesh(&[turned(1.0)])], 1e-3);
+        let piece = found.pieces.iter().find(|p| p.kind == EdgeKind::Feature).unwrap();
+        assert!((piece.max_angle - 90.0).abs() < 1e-6 && piece.neighbours == [ids[1]], "{piece:?}");
+        let (_, found) = edges(vec![mesh(&[flat]), mesh(&[turned(1.0)]), mesh(&[turned(-1.0)])], 1e-3);
+        assert_eq!(found.count(EdgeKind::NonManifold), 3, "{:?}", found.pieces);
     }
 
     #[test]
