@@ -16,6 +16,7 @@ use patchwright::kernel::mesh::facets::Facets;
 use patchwright::kernel::mesh::grid::Grid;
 use patchwright::kernel::mesh::tri_mesh::{Group, TriMesh};
 use patchwright::kernel::mesh_ssi::engine::{MeshSsiOptions, intersect_bodies};
+use patchwright::kernel::ssi::result::{Intersection, IntersectionCurve};
 
 const REGRESSIONS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/bad_meshes");
 
@@ -271,28 +272,152 @@ fn wrong_record_marks_are_named_and_the_grid_is_read_without_them() {
     }
 }
 
+type Soup = (Vec<DVec3>, Vec<[u32; 3]>);
+
+fn body((points, triangles): Soup) -> Body {
+    Body::from(Arc::new(Facets::of_mesh(TriMesh::new(points, triangles).unwrap())))
+}
+
+fn meet(a: &Soup, b: &Soup) -> Intersection {
+    let result =
+        intersect_bodies(&[(0, body(a.clone()))], &[(1, body(b.clone()))], &MeshSsiOptions::default(), &Job::new());
+    let result = result.unwrap();
+    assert!(result.complete);
+    result
+}
+
+/// A box of 12 triangles, outward.
+fn cube(low: DVec3, high: DVec3) -> Soup {
+    let corner = |k: usize| DVec3::new([low.x, high.x][k & 1], [low.y, high.y][k >> 1 & 1], [low.z, high.z][k >> 2]);
+    let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles: Vec<[u32; 3]> = faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
+    ((0..8).map(corner).collect(), triangles)
+}
+
+/// One rectangle across x = 0.3, standing on the plane z = 0.
+fn wall() -> Soup {
+    let at = |y: f64, z: f64| DVec3::new(0.3, y, z);
+    (vec![at(-9.0, -1.0), at(9.0, -1.0), at(9.0, 1.0), at(-9.0, 1.0)], vec![[0, 1, 2], [0, 2, 3]])
+}
+
+fn length(curve: &IntersectionCurve) -> f64 {
+    curve.points.windows(2).map(|p| p[0].xyz.distance(p[1].xyz)).sum()
+}
+
+/// Two halves of the square [0, 1]^2 at z = 0: the lower one has its upper edge in one piece, the upper one has a vertex in
+/// the middle of it, at x = `joint`.
+fn t_junction(joint: f64) -> Soup {
+    let at = |x: f64, y: f64| DVec3::new(x, y, 0.0);
+    let points =
+        vec![at(0.0, 0.0), at(1.0, 0.0), at(1.0, 0.5), at(0.0, 0.5), at(joint, 0.5), at(0.0, 1.0), at(1.0, 1.0)];
+    (points, vec![[0, 1, 2], [0, 2, 3], [3, 4, 5], [4, 6, 5], [4, 2, 6]])
+}
+
 #[test]
-fn duplicate_coplanar_and_non_manifold_triangles_keep_the_topology() {
-    let cube = |low: DVec3, high: DVec3| {
-        let corner =
-            |k: usize| DVec3::new([low.x, high.x][k & 1], [low.y, high.y][k >> 1 & 1], [low.z, high.z][k >> 2]);
-        let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-        let triangles: Vec<[u32; 3]> = faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
-        ((0..8).map(corner).collect::<Vec<_>>(), triangles)
+fn a_t_junction_is_a_border_in_the_mesh_and_no_gap_in_the_curve() {
+    for joint in [0.5, 0.3] {
+        let mesh = t_junction(joint);
+        let defects = TriMesh::new(mesh.0.clone(), mesh.1.clone()).unwrap().defects();
+        // Six around the square (the left and right side have two each), and one and two along the crack.
+        assert_eq!((defects.border_edges, defects.non_manifold_edges, defects.degenerate), (9, 0, 0));
+        let found = meet(&mesh, &wall());
+        // The wall passes the crack beside its vertex, or through it: two pieces meet there in one point.
+        let total: f64 = found.curves.iter().map(length).sum();
+        assert!((total - 1.0).abs() < 1e-12, "joint at {joint}: {total} in {} curves", found.curves.len());
+        assert_eq!(
+            (found.curves.len(), found.curves[0].closed),
+            (1, false),
+            "joint at {joint}: joined across the crack"
+        );
+    }
+}
+
+#[test]
+fn an_edge_through_vertices_and_along_edges_is_met_once() {
+    // A fan around the origin; the wall's plane holds its middle vertex, then two of its edges as well.
+    let fan = |turn: f64| -> Soup {
+        let rim = |k: usize| {
+            let a = turn + std::f64::consts::TAU * k as f64 / 8.0;
+            DVec3::new(0.3 + a.cos(), a.sin(), 0.0)
+        };
+        let mut points = vec![DVec3::new(0.3, 0.0, 0.0)];
+        points.extend((0..8).map(rim));
+        (points, (0..8).map(|k| [0, 1 + k, 1 + (k + 1) % 8]).collect())
     };
-    let body = |(points, triangles): (Vec<DVec3>, Vec<[u32; 3]>)| {
-        Body::from(Arc::new(Facets::of_mesh(TriMesh::new(points, triangles).unwrap())))
-    };
-    let run =
-        |a: Body, b: Body| intersect_bodies(&[(0, a)], &[(1, b)], &MeshSsiOptions::default(), &Job::new()).unwrap();
-    let (a, b) = (cube(DVec3::ZERO, DVec3::splat(2.0)), cube(DVec3::splat(1.0), DVec3::splat(3.0)));
-    let plain = run(body(a.clone()), body(b.clone()));
-    assert_eq!((plain.curves.len(), plain.curves[0].closed, plain.complete), (1, true, true));
-    // Degenerate triangles, duplicates, a fin on an edge, and coplanar overlap change nothing of that loop.
+    for turn in [0.1, std::f64::consts::FRAC_PI_4, 0.0] {
+        let found = meet(&fan(turn), &wall());
+        assert_eq!((found.curves.len(), found.curves[0].closed), (1, false), "turned by {turn}");
+        // Across the octagon: its width through the middle at this angle.
+        let a = (std::f64::consts::FRAC_PI_2 - turn).rem_euclid(std::f64::consts::FRAC_PI_4);
+        let (half, middle) = (std::f64::consts::FRAC_PI_8, (a - std::f64::consts::FRAC_PI_8).cos());
+        assert!((length(&found.curves[0]) - 2.0 * half.cos() / middle).abs() < 1e-12, "turned by {turn}");
+    }
+}
+
+#[test]
+fn a_duplicate_triangle_gives_its_part_of_the_curve_twice() {
+    let a = cube(DVec3::ZERO, DVec3::splat(2.0));
+    let b = cube(DVec3::splat(1.0), DVec3::splat(3.0));
+    let plain = meet(&a, &b);
+    assert_eq!((plain.curves.len(), plain.curves[0].closed), (1, true));
+    let loop_length = length(&plain.curves[0]);
+    // The corner that is cut off: six edges of length 1.
+    assert!((loop_length - 6.0).abs() < 1e-12);
+    // Triangle [1, 3, 7] of the side x = 2 is where z <= y: it holds the line z = 1 from y = 1 to 2.
+    let mut twice = a.clone();
+    twice.1.push([1, 3, 7]);
+    let counted = TriMesh::new(twice.0.clone(), twice.1.clone()).unwrap().defects();
+    assert_eq!((counted.duplicate, counted.non_manifold_edges), (1, 3));
+    let total: f64 = meet(&twice, &b).curves.iter().map(length).sum();
+    assert!((total - 7.0).abs() < 1e-12, "{total}");
+}
+
+#[test]
+fn triangles_without_area_change_nothing() {
+    let a = cube(DVec3::ZERO, DVec3::splat(2.0));
+    let b = cube(DVec3::splat(1.0), DVec3::splat(3.0));
     let mut spoiled = a.clone();
-    spoiled.1.extend([[0, 0, 1], [2, 2, 2], [0, 2, 3]]);
-    let found = run(body(spoiled), body(b.clone()));
-    assert!(found.curves.iter().any(|c| c.closed), "{:?}", found.curves.len());
-    let coplanar = run(body(a), body(cube(DVec3::new(0.5, 0.5, 0.0), DVec3::new(1.5, 1.5, 2.0))));
-    assert!(coplanar.curves.iter().all(|c| c.closed));
+    spoiled.1.extend([[0, 0, 1], [2, 2, 2]]);
+    let found = meet(&spoiled, &b);
+    assert_eq!((found.curves.len(), found.curves[0].closed), (1, true));
+    assert!((length(&found.curves[0]) - 6.0).abs() < 1e-12);
+}
+
+#[test]
+fn coplanar_faces_meet_as_if_one_body_were_shifted_by_less_than_any_number() {
+    // Floors and roofs lie in common planes; b is shifted up and out by nothing that can be measured. Its floor is then
+    // inside a and its roof outside, so that the curve is one loop around where b leaves a: on the common roof.
+    let a = cube(DVec3::ZERO, DVec3::splat(2.0));
+    let b = cube(DVec3::new(0.5, 0.5, 0.0), DVec3::new(1.5, 1.5, 2.0));
+    let found = meet(&a, &b);
+    assert!(found.curves.iter().all(|c| c.closed), "no curve may end on a closed body");
+    let roof: f64 = found.curves.iter().map(length).sum();
+    assert!((roof - 4.0).abs() < 1e-12, "{roof}");
+    assert!(found.curves.iter().flat_map(|c| &c.points).all(|p| p.xyz.z == 2.0));
+    // The same body twice: the answer is closed, too.
+    assert!(meet(&a, &a).curves.iter().all(|c| c.closed));
+}
+
+#[test]
+fn a_non_manifold_edge_is_a_junction_of_as_many_curves_as_it_has_sheets() {
+    for sheets in [3_u32, 4, 5] {
+        let mut mesh: Soup = (vec![DVec3::new(0.3, 0.0, -2.0), DVec3::new(0.3, 0.0, 2.0)], vec![]);
+        for k in 0..sheets {
+            let (s, c) = (0.4 + std::f64::consts::TAU * f64::from(k) / f64::from(sheets)).sin_cos();
+            mesh.0.push(DVec3::new(0.3 + c, s, 0.0));
+            mesh.1.push([0, 1, 2 + k]);
+        }
+        let defects = TriMesh::new(mesh.0.clone(), mesh.1.clone()).unwrap().defects();
+        assert_eq!((defects.non_manifold_edges, defects.border_edges), (1, 2 * sheets as usize));
+        let floor: Soup =
+            ([[-9.0, -9.0, 0.1], [9.0, -9.0, 0.1], [0.0, 19.0, 0.1]].map(DVec3::from_array).to_vec(), vec![[0, 1, 2]]);
+        let found = meet(&mesh, &floor);
+        assert_eq!(found.curves.len(), sheets as usize);
+        assert_eq!(found.junctions.len(), 1);
+        assert!(found.junctions[0].xyz.distance(DVec3::new(0.3, 0.0, 0.1)) < 1e-15);
+        for curve in &found.curves {
+            assert!(curve.end_ids.contains(&Some(0)), "every curve ends in the junction");
+            assert!((length(curve) - 0.95).abs() < 1e-12, "{}", length(curve));
+        }
+    }
 }
