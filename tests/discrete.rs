@@ -331,11 +331,13 @@ fn all_pairs_of_surfaces_and_a_mesh_are_intersected_and_written() {
     let curves = named["curves"].as_array().unwrap();
     let pairs: Vec<_> = curves.iter().map(|c| (c["points"][0]["a"].clone(), c["points"][0]["b"].clone())).collect();
     assert_eq!(pairs, [(0.into(), 1.into()), (0.into(), 2.into()), (1.into(), 2.into())]);
-    // The three branches meet in one point, over (1.1, 0.9).
+    // The three branches meet in one point, over (1.1, 0.9); each pair of bodies has it.
     let junctions = named["junctions"].as_array().unwrap();
-    assert_eq!(junctions.len(), 1);
-    assert!((junctions[0]["xyz"][0].as_f64().unwrap() - 1.1).abs() < 1e-9);
-    assert!((junctions[0]["xyz"][1].as_f64().unwrap() - 0.9).abs() < 1e-9);
+    assert_eq!(junctions.len(), 3);
+    for junction in junctions {
+        assert!((junction["xyz"][0].as_f64().unwrap() - 1.1).abs() < 1e-9);
+        assert!((junction["xyz"][1].as_f64().unwrap() - 0.9).abs() < 1e-9);
+    }
     let written = io::open(&folder.join("curves.igs")).unwrap().document;
     assert_eq!((written.curves().count(), written.surfaces().count()), (3, 2));
     let degrees: Vec<usize> = written.curves().map(|(_, c)| c.knots().degree()).collect();
