@@ -53,7 +53,7 @@ pub fn traces_of(result: &Intersection, model: &Document, tol: f64) -> Traces {
     let (mut curves, mut traces, mut notes, mut bound) = (Vec::new(), Vec::new(), Vec::new(), 0.0_f64);
     for (k, curve) in result.curves.iter().enumerate() {
         if curve.points.iter().any(|p| p.a.max(p.b) >= numbered.len()) {
-            let Some((space, runs, off)) = polyline(curve, &surfaces) else {
+            let Some(Polyline { space, runs, off }) = polyline(curve, &surfaces) else {
                 notes.push(format!("intersection {k} was left out: it has no length"));
                 continue;
             };
@@ -92,13 +92,18 @@ pub fn traces_of(result: &Intersection, model: &Document, tol: f64) -> Traces {
     Traces { document, curves, traces, bound, notes }
 }
 
-/// A curve as the polyline that it is, and for every stretch on one surface the number of that surface, the polyline in
-/// its parameters, and the stretch in space with the same parameter; and how far the two are apart at most, at the
-/// quarters of the chords. `None` where it has no length.
-fn polyline(
-    curve: &IntersectionCurve,
-    surfaces: &[(usize, &Surface)],
-) -> Option<(Curve, Vec<(usize, Curve, Curve)>, f64)> {
+/// A curve as the polyline that it is.
+struct Polyline {
+    space: Curve,
+    /// For every stretch on one surface the number of that surface, the polyline in its parameters, and the stretch in
+    /// space with the same parameter.
+    runs: Vec<(usize, Curve, Curve)>,
+    /// How far the last two are apart at most, at the quarters of the chords.
+    off: f64,
+}
+
+/// `None` where the curve has no length.
+fn polyline(curve: &IntersectionCurve, surfaces: &[(usize, &Surface)]) -> Option<Polyline> {
     let all: Vec<DVec3> = curve.points.iter().map(|p| p.xyz).collect();
     let space = Curve::polyline(&all).ok()?;
     let (mut runs, mut off) = (Vec::new(), 0.0_f64);
@@ -122,5 +127,5 @@ fn polyline(
             runs.push((number, in_surface, in_space));
         }
     }
-    Some((space, runs, off))
+    Some(Polyline { space, runs, off })
 }
