@@ -332,7 +332,8 @@ fn say_defects(found: &Defects, document: &Document, all: bool, common: &Common)
         common.say(format!("{}: {}, the worst {:.3e}{unit} ({measure})", kind.name(), of_kind.len(), worst.size));
         for defect in of_kind.iter().filter(|_| all) {
             let (faces, at) = (&defect.faces, defect.at);
-            common.say(format!("  {:.3e}{unit} at ({}, {}, {}), faces {faces:?}", defect.size, at.x, at.y, at.z));
+            let deep = defect.depth.map_or(String::new(), |d| format!(", {d:.3e}{unit} deep,"));
+            common.say(format!("  {:.3e}{unit}{deep} at ({}, {}, {}), faces {faces:?}", defect.size, at.x, at.y, at.z));
         }
     }
     if found.list.is_empty() {

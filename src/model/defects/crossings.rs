@@ -1,9 +1,12 @@
 //! Pairs of faces that cross each other, or lie on one another over an area.
 //!
 //! Faces become triangles; where triangles of two faces meet, away from the edges of both, the place is brought onto the
-//! two surfaces by alternating projection, and counts when it stays inside both faces. So what is listed is
-//! true; what is less deep than the chord tolerance may be missed. Faces that end on one another are no crossing:
-//! that is what edges are for. The length of a crossing is that of its triangles' segments.
+//! two surfaces by alternating projection, and counts when it stays inside both faces. Near the edges, where triangles
+//! of neighbours meet by their chord alone, crossings are looked for on the surfaces themselves ([`super::strips`]). So
+//! what is listed is true; away from edges, what is less deep than the chord tolerance may be missed. Faces that
+//! end on one another are no crossing: that is what edges are for. The length of a crossing is that of its triangles'
+//! segments, or that of the edge along which it was found. Its depth is how far it is inside both faces: what would have
+//! to be cut off one of them so that they no longer cross there.
 //!
 //! Overlaps are looked for at the middles of triangles: the nearest place of the other surface is inside the other
 //! face, nearer than the tolerance, and its normal is parallel.
@@ -11,9 +14,11 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::strips::{self, Border};
 use super::{Defect, DefectKind, DefectOptions};
 use crate::kernel::geom::Aabb;
-use crate::kernel::geom::closest::{Closed, closed_directions, closest_from};
+use crate::kernel::geom::closest::{Closed, Foot, closed_directions, closest_from};
+use crate::kernel::geom::closest_curve::closest_between;
 use crate::kernel::geom::trim::Sheet;
 use crate::kernel::job::Job;
 use crate::kernel::mesh::face_mesh::tessellate_face;
@@ -28,14 +33,17 @@ const PARALLEL: f64 = 0.99;
 const PROJECTIONS: usize = 60;
 
 /// A face with its triangles.
-struct Part<'s> {
-    sheet: &'s Sheet,
+pub(super) struct Part<'s> {
+    pub(super) sheet: &'s Sheet,
     closed: Closed,
     mesh: SurfaceMesh,
-    tree: TriTree,
-    bounds: Aabb,
-    /// Its edges as segments, sorted by nothing: they are only looked at near crossings.
-    borders: TriTree,
+    pub(super) tree: TriTree,
+    pub(super) bounds: Aabb,
+    /// Its edges.
+    pub(super) borders: Vec<Border>,
+    /// The edges as segments: their tree, and the edge and the parameters of each.
+    segments: TriTree,
+    of_segment: Vec<(u32, [f64; 2])>,
     chord: f64,
 }
 
@@ -49,16 +57,19 @@ impl<'s> Part<'s> {
             Some(face) => tessellate_face(face, &options, &[Vec::new(), Vec::new()]).mesh,
         };
         let tree = TriTree::new(mesh.points.clone(), &mesh.triangles);
+        let borders = strips::borders(sheet);
         // Segments are triangles with two equal corners.
-        let (mut points, mut segments) = (Vec::new(), Vec::new());
-        for curve in super::quality::borders(sheet) {
+        let (mut points, mut segments, mut of_segment) = (Vec::new(), Vec::new(), Vec::new());
+        for (k, border) in borders.iter().enumerate() {
             let first = points.len() as u32;
-            points.extend(curve.sampled(8).into_iter().map(|s| s.1));
+            let samples = border.curve.sampled(8);
+            points.extend(samples.iter().map(|s| s.1));
             segments.extend((first..(points.len() as u32).saturating_sub(1)).map(|k| [k, k + 1, k + 1]));
+            of_segment.extend(samples.windows(2).map(|w| (k as u32, [w[0].0, w[1].0])));
         }
         let bounds = Aabb::of(mesh.points.iter().copied());
-        let borders = TriTree::new(points, &segments);
-        Self { sheet, closed: closed_directions(surface), mesh, tree, bounds, borders, chord }
+        let segments = TriTree::new(points, &segments);
+        Self { sheet, closed: closed_directions(surface), mesh, tree, bounds, borders, segments, of_segment, chord }
     }
 
     fn corners(&self, triangle: u32) -> [DVec3; 3] {
@@ -66,19 +77,27 @@ impl<'s> Part<'s> {
     }
 
     /// The parameters in the middle of a triangle.
-    fn uv(&self, triangle: u32) -> DVec2 {
+    pub(super) fn uv(&self, triangle: u32) -> DVec2 {
         self.mesh.triangles[triangle as usize].iter().map(|&k| self.mesh.uv[k as usize]).sum::<DVec2>() / 3.0
     }
 
-    /// How far a place is from the edges, up to a limit.
+    /// How far a place is from the edges by their polylines, up to a limit.
     fn off_border(&self, p: DVec3, limit: f64) -> f64 {
-        self.borders.nearest(p, limit).map_or(limit, |n| n.distance)
+        self.segments.nearest(p, limit).map_or(limit, |n| n.distance)
+    }
+
+    /// How far a place is from the edges themselves.
+    pub(super) fn depth(&self, p: DVec3) -> f64 {
+        let Some(near) = self.segments.nearest(p, f64::INFINITY) else { return f64::INFINITY };
+        let Some(&(border, [start, end])) = self.of_segment.get(near.triangle as usize) else { return near.distance };
+        let along = start + (end - start) * (1.0 - near.barycentric.x);
+        let curve = &self.borders[border as usize].curve;
+        closest_between(curve, p, curve.domain(), along).distance
     }
 
     /// The nearest place of the surface, from a start.
-    fn foot(&self, p: DVec3, start: DVec2) -> (DVec2, DVec3) {
-        let foot = closest_from(self.sheet.surface(), self.closed, p, start);
-        (foot.uv, foot.point)
+    pub(super) fn foot(&self, p: DVec3, start: DVec2) -> Foot {
+        closest_from(self.sheet.surface(), self.closed, p, start)
     }
 }
 
@@ -118,7 +137,7 @@ pub fn find(sheets: &[Sheet], options: &DefectOptions, job: &Job) -> Vec<Defect>
 fn defect(kind: DefectKind, faces: [usize; 2], places: &[DVec3], at: DVec3, size: f64) -> Defect {
     let bounds = Aabb::of(places.iter().copied());
     let reach = 0.5 * bounds.diagonal();
-    Defect { kind, faces: faces.to_vec(), entities: Vec::new(), edges: Vec::new(), at, reach, size }
+    Defect { kind, faces: faces.to_vec(), entities: Vec::new(), edges: Vec::new(), at, reach, size, depth: None }
 }
 
 fn crossing(numbers: [usize; 2], p: &Part<'_>, q: &Part<'_>, options: &DefectOptions, job: &Job) -> Option<Defect> {
@@ -139,10 +158,16 @@ fn crossing(numbers: [usize; 2], p: &Part<'_>, q: &Part<'_>, options: &DefectOpt
     let at = order.into_iter().find_map(|k| {
         let (_, ends, triangles) = segments[k];
         confirmed(p, q, 0.5 * (ends[0] + ends[1]), triangles, margin)
-    })?;
+    });
+    let Some(at) = at else {
+        let found = strips::find(p, q, margin, options.tolerance, job)?;
+        let crossing = defect(DefectKind::Crossing, numbers, &found.places, found.at, found.length);
+        return Some(Defect { depth: Some(found.depth), ..crossing });
+    };
     let length = segments.iter().map(|(_, [a, b], _)| a.distance(*b)).sum();
     let places: Vec<DVec3> = segments.iter().flat_map(|s| s.1).collect();
-    Some(defect(DefectKind::Crossing, numbers, &places, at, length))
+    let depth = Some(p.depth(at).min(q.depth(at)));
+    Some(Defect { depth, ..defect(DefectKind::Crossing, numbers, &places, at, length) })
 }
 
 /// A place on both surfaces, inside both faces and away from their edges, near one where their triangles cross.
@@ -151,11 +176,11 @@ fn confirmed(p: &Part<'_>, q: &Part<'_>, start: DVec3, triangles: [u32; 2], marg
     let mut x = start;
     let close = 1e-9 * (p.bounds.diagonal() + q.bounds.diagonal());
     for _ in 0..PROJECTIONS {
-        let (a_uv, a) = p.foot(x, uv);
-        let (b_st, b) = q.foot(a, st);
-        (uv, st) = (a_uv, b_st);
-        let apart = a.distance(b);
-        x = 0.5 * (a + b);
+        let a = p.foot(x, uv);
+        let b = q.foot(a.point, st);
+        (uv, st) = (a.uv, b.uv);
+        let apart = a.point.distance(b.point);
+        x = 0.5 * (a.point + b.point);
         if apart <= close {
             let normals = [(p, uv), (q, st)].map(|(part, at)| part.sheet.surface().jet(at, 1).normal());
             let [Some(m), Some(n)] = normals else { return None };
@@ -163,7 +188,7 @@ fn confirmed(p: &Part<'_>, q: &Part<'_>, start: DVec3, triangles: [u32; 2], marg
             let inside = p.sheet.reaches(uv, 0.0) && q.sheet.reaches(st, 0.0);
             let away = p.off_border(x, limit).min(q.off_border(x, limit)) > 0.5 * margin;
             // Faces that touch without crossing have parallel normals.
-            return (inside && away && m.cross(n).length() > 1e-4).then_some(x);
+            return (inside && away && m.cross(n).length() > strips::LEAST_SINE).then_some(x);
         }
         if x.distance(start) > 4.0 * margin {
             return None;
@@ -188,7 +213,7 @@ fn overlap(numbers: [usize; 2], p: &Part<'_>, q: &Part<'_>, options: &DefectOpti
         let Some(near) = q.tree.nearest(middle, reach) else { continue };
         let uv = p.uv(t);
         let jet = p.sheet.surface().jet(p.sheet.surface().clamped(uv), 1);
-        let (st, y) = q.foot(jet.p(), q.uv(near.triangle));
+        let Foot { uv: st, point: y, .. } = q.foot(jet.p(), q.uv(near.triangle));
         let normals = (jet.normal(), q.sheet.surface().jet(st, 1).normal());
         let (Some(m), Some(n)) = normals else { continue };
         let on = y.distance(jet.p()) <= options.overlap && m.dot(n).abs() > PARALLEL && q.sheet.reaches(st, 0.0);

@@ -27,7 +27,7 @@ pub fn find(document: &Document, sheets: &[Sheet], options: &DefectOptions, job:
         let mut add = |kind, size| {
             let (faces, edges) = (faces.clone(), all.clone());
             let reach = 0.5 * edge.length;
-            out.push(Defect { kind, faces, entities: Vec::new(), edges, at: edge.place, reach, size });
+            out.push(Defect { kind, faces, entities: Vec::new(), edges, at: edge.place, reach, size, depth: None });
         };
         match edge.meets {
             Meets::Free | Meets::Partly { .. } => add(DefectKind::FreeEdge, edge.length),
@@ -68,6 +68,7 @@ fn of_loops(number: usize, face: &Face, options: &DefectOptions) -> Vec<Defect> 
                 at: 0.5 * (ends[edge][1] + ends[(edge + 1) % count][0]),
                 reach: gap,
                 size: gap,
+                depth: None,
             });
         }
     }
@@ -83,6 +84,7 @@ fn of_loops(number: usize, face: &Face, options: &DefectOptions) -> Vec<Defect> 
             at: 0.5 * (bounds.min + bounds.max),
             reach: 0.5 * bounds.diagonal(),
             size: mesh.lost as f64,
+            depth: None,
         });
     }
     out

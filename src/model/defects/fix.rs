@@ -267,6 +267,7 @@ mod tests {
             at: DVec3::ZERO,
             reach: 1.0,
             size: 1.0,
+            depth: None,
         };
         assert_eq!(patch_for(&document, &defect, &options, &Job::new()), Err(FixError::Kind));
         let edges = vec![EdgeAt { face: 7, ring: 0, edge: 0 }];

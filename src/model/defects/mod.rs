@@ -6,8 +6,9 @@
 //! - Single faces ([`quality`]): slivers, parametrizations whose lines nearly coincide or bunch up; on request
 //!   faces that run through themselves ([`crate::kernel::self_ssi`]).
 //!
-//! Pairs are found on triangles and confirmed on the surfaces, so what is listed is there. What the triangles miss is not
-//! listed: a crossing that is less deep than their chord tolerance. The intersection tool decides such pairs for
+//! Pairs are found on triangles, near edges on strips along them ([`strips`]), and confirmed on the surfaces, so what is
+//! listed is there. What the triangles miss is not listed: a crossing far from edges whose faces part by less than
+//! the chord tolerance. The intersection tool decides such pairs for
 //! certain. Results do not depend on the number of threads. Cost: some milliseconds a face; self-intersections more.
 
 use serde::Serialize;
@@ -23,6 +24,7 @@ mod crossings;
 mod edges;
 pub mod fix;
 mod quality;
+mod strips;
 
 /// What is wrong. The order is that of the list: what meshers mind most comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
@@ -114,6 +116,8 @@ pub struct Defect {
     pub reach: f64,
     /// How bad it is; see [`DefectKind::measure`].
     pub size: f64,
+    /// Of crossings, how far they go: the largest distance from the edges of both faces that was met.
+    pub depth: Option<f64>,
 }
 
 /// What counts as a defect. Lengths in model units.

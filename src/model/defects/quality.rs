@@ -3,9 +3,9 @@
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
+use super::strips::borders;
 use super::{Defect, DefectKind, DefectOptions};
-use crate::kernel::geom::trim::{EdgeRole, Sheet};
-use crate::kernel::geom::{Curve, Side};
+use crate::kernel::geom::trim::Sheet;
 use crate::kernel::job::Job;
 use crate::kernel::mesh::area::area;
 use crate::kernel::self_ssi::{self, SelfIntersectOptions, SelfIntersection};
@@ -16,7 +16,7 @@ const PLACES: usize = 12;
 const THIN: f64 = 20.0;
 
 fn defect(kind: DefectKind, face: usize, at: DVec3, reach: f64, size: f64) -> Defect {
-    Defect { kind, faces: vec![face], entities: Vec::new(), edges: Vec::new(), at, reach, size }
+    Defect { kind, faces: vec![face], entities: Vec::new(), edges: Vec::new(), at, reach, size, depth: None }
 }
 
 /// Finds slivers and bad parametrizations.
@@ -39,22 +39,11 @@ pub fn find(sheets: &[Sheet], options: &DefectOptions, job: &Job) -> Vec<Defect>
     found.into_iter().flatten().collect()
 }
 
-/// The edges of a sheet in space.
-pub(super) fn borders(sheet: &Sheet) -> Vec<Curve> {
-    match sheet.face() {
-        None => Side::ALL.iter().filter_map(|&side| sheet.surface().border(side).ok()).collect(),
-        Some(face) => {
-            let edges = face.rings().iter().flat_map(|r| &r.edges).filter(|e| e.role != EdgeRole::Cut);
-            edges.map(|e| e.curve.as_ref().clone()).collect()
-        }
-    }
-}
-
 /// A strip's width is twice its area by its perimeter.
 fn sliver(number: usize, sheet: &Sheet, options: &DefectOptions) -> Option<Defect> {
     let perimeter: f64 = borders(sheet)
         .iter()
-        .flat_map(|c| c.sampled(8).windows(2).map(|w| w[0].1.distance(w[1].1)).collect::<Vec<_>>())
+        .flat_map(|border| border.curve.sampled(8).windows(2).map(|w| w[0].1.distance(w[1].1)).collect::<Vec<_>>())
         .sum();
     let width = 2.0 * area(sheet) / perimeter;
     if !(width < options.joining && 0.5 * perimeter > THIN * width) {

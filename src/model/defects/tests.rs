@@ -3,7 +3,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 
 use super::*;
-use crate::kernel::geom::{Knots, Surface};
+use crate::kernel::geom::{Knots, Surface, sweep};
 use crate::model::document::{Shape, Unit};
 
 fn quad(corners: [[f64; 3]; 4]) -> Surface {
@@ -70,6 +70,51 @@ fn a_wall_that_ends_on_a_floor_crosses_nothing() {
     let wall = quad([[0.25, 0.5, 0.0], [0.75, 0.5, 0.0], [0.25, 0.5, 0.5], [0.75, 0.5, 0.5]]);
     let defects = found(&document(vec![tile(0.0, 0.0, 0.0), wall]));
     assert_eq!(count(&defects, DefectKind::Crossing), 0, "{:?}", defects.list);
+}
+
+#[test]
+fn a_wall_that_goes_a_little_through_a_floor_crosses_it_by_that() {
+    // Less deep than the joining tolerance, 1e-3 of the diagonal; near its edge triangles of the floor say nothing.
+    let wall = |below: f64| quad([[0.25, 0.5, -below], [0.75, 0.5, -below], [0.25, 0.5, 0.5], [0.75, 0.5, 0.5]]);
+    for below in [1e-5, 1e-4, 1e-3, 1e-2] {
+        let defects = found(&document(vec![tile(0.0, 0.0, 0.0), wall(below)]));
+        let crossing: Vec<&Defect> = defects.of(DefectKind::Crossing).collect();
+        assert_eq!(crossing.len(), 1, "{below}: {:?}", defects.list);
+        let depth = crossing[0].depth.unwrap();
+        assert!((depth / below - 1.0).abs() < 1e-6, "{below}: {depth}");
+        assert!(crossing[0].at.z.abs() < 1e-9 && crossing[0].size > 0.4 && crossing[0].size < 0.53, "{crossing:?}");
+    }
+    // At the tolerance itself the wall stands on the floor.
+    assert_eq!(count(&found(&document(vec![tile(0.0, 0.0, 0.0), wall(1e-7)])), DefectKind::Crossing), 0);
+}
+
+#[test]
+fn a_crossing_near_the_edge_of_a_curved_floor_is_found() {
+    // The quarter of a cylinder, and a plane that cuts off a strip along its upper border: 2e-3 wide, then 1e-4.
+    let arc = sweep::arc(DVec3::ZERO, DVec3::X, DVec3::Z, 0.0, std::f64::consts::FRAC_PI_2).unwrap();
+    let floor = sweep::extruded(&arc, DVec3::Y).unwrap();
+    for width in [2e-3f64, 1e-4] {
+        let x = width.sin();
+        let upright = quad([[x, 0.2, 0.5], [x, 0.8, 0.5], [x, 0.2, 1.5], [x, 0.8, 1.5]]);
+        let defects = found(&document(vec![floor.clone(), upright]));
+        let crossing: Vec<&Defect> = defects.of(DefectKind::Crossing).collect();
+        assert_eq!(crossing.len(), 1, "{width}: {:?}", defects.list);
+        let depth = crossing[0].depth.unwrap();
+        // The chord of the strip: the distance of the crossing from the border.
+        assert!((depth / (2.0 * (0.5 * width).sin()) - 1.0).abs() < 1e-6, "{width}: {depth}");
+    }
+}
+
+#[test]
+fn neighbours_that_meet_at_an_edge_cross_nothing_whatever_their_angle() {
+    let along = |angle: f64| {
+        let (y, z) = (1.0 + angle.cos(), angle.sin());
+        quad([[0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, y, z], [1.0, y, z]])
+    };
+    for angle in [0.0f64, 0.01, 0.5, 1.5, 2.5, 3.0, -0.5, -2.0] {
+        let defects = found(&document(vec![tile(0.0, 0.0, 0.0), along(angle)]));
+        assert_eq!(count(&defects, DefectKind::Crossing), 0, "{angle}: {:?}", defects.list);
+    }
 }
 
 #[test]

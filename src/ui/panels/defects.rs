@@ -51,7 +51,10 @@ fn measured(defect: &Defect, unit: Unit) -> String {
         DefectKind::Overlap => format!("{} {}²", short(defect.size), unit.symbol()),
         DefectKind::Parametrization => format!("{}°", short(defect.size)),
         DefectKind::NonManifold | DefectKind::CrossingLoop => format!("{:.0}", defect.size),
-        _ => length(defect.size, unit),
+        _ => match defect.depth {
+            Some(depth) => format!("{}, {} deep", length(defect.size, unit), length(depth, unit)),
+            None => length(defect.size, unit),
+        },
     }
 }
 
