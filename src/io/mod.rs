@@ -17,6 +17,7 @@ pub mod autosave;
 mod color;
 mod discrete;
 pub mod export;
+mod faces;
 mod format;
 pub mod iges;
 mod number;
@@ -178,17 +179,22 @@ pub fn open(path: &Path) -> Result<Opened, OpenError> {
     if bytes.is_empty() {
         return Err(OpenError::Empty { path: path.into() });
     }
-    match Format::of_content(&bytes).or_else(|| Format::of_name(path)) {
-        Some(Format::Iges) => iges::read(&bytes).map_err(|source| OpenError::Iges { path: path.into(), source }),
-        Some(Format::Step) => Ok(step::open(&bytes)),
+    read(path, &bytes, Format::of_content(&bytes).or_else(|| Format::of_name(path)))
+}
+
+/// Reads the bytes of a file as one format; without any as Plot3D. The path is for messages.
+pub fn read(path: &Path, bytes: &[u8], format: Option<Format>) -> Result<Opened, OpenError> {
+    match format {
+        Some(Format::Iges) => iges::read(bytes).map_err(|source| OpenError::Iges { path: path.into(), source }),
+        Some(Format::Step) => Ok(step::open(bytes)),
         Some(Format::Project) => {
-            project::read(&bytes).map_err(|source| OpenError::Project { path: path.into(), source })
+            project::read(bytes).map_err(|source| OpenError::Project { path: path.into(), source })
         }
         Some(format @ (Format::Stl | Format::Obj | Format::Plot3d)) => {
-            discrete::open(&bytes, format).map_err(|source| OpenError::Discrete { path: path.into(), format, source })
+            discrete::open(bytes, format).map_err(|source| OpenError::Discrete { path: path.into(), format, source })
         }
         // Nothing in a Plot3D file says what it is, and its extension may be anything.
-        None => discrete::open(&bytes, Format::Plot3d).map_err(|_| OpenError::Unknown { path: path.into() }),
+        None => discrete::open(bytes, Format::Plot3d).map_err(|_| OpenError::Unknown { path: path.into() }),
     }
 }
 

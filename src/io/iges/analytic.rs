@@ -107,11 +107,16 @@ impl Reader<'_> {
         let turned = params.integer("a direction").map_err(text)? == 1;
         let first = self.one_curve(pointers[0], depth, "first curve")?;
         let second = self.one_curve(pointers[1], depth, "second curve")?;
-        if form == 0 && (first.knots().degree() > 1 || second.knots().degree() > 1) {
-            notes.push("its lines join equal fractions of the arc lengths; they are taken at equal parameters".into());
-        }
         let second = if turned { second.reversed() } else { second };
-        analytic::ruled(&first, &second).map_err(text)
+        if form != 0 {
+            return analytic::ruled(&first, &second).map_err(text);
+        }
+        // Form 0 joins equal fractions of the arc lengths.
+        let (made, off) = analytic::ruled_by_length(&first, &second).map_err(text)?;
+        if off > 1e-6 * made.bounds().diagonal() {
+            notes.push(format!("its lines join equal fractions of the arc lengths within {off:.1e} only"));
+        }
+        Ok(made)
     }
 
     /// An offset surface (140).

@@ -15,8 +15,9 @@ use glam::{DAffine3, DVec3};
 
 use super::params::{ParamError, Params};
 use super::{Geometry, Reader, Severity, kinds};
+use crate::io::faces::{FaceJob, reach};
 use crate::io::iges::uses::Uses;
-use crate::kernel::geom::ring::{self, EdgeInput, RingOptions};
+use crate::kernel::geom::ring::{self, EdgeInput};
 use crate::kernel::geom::trim::SurfaceKind;
 use crate::kernel::geom::{Curve, Surface};
 use crate::model::document::Shape;
@@ -24,17 +25,6 @@ use crate::model::document::Shape;
 /// The loops of a face, each with its edges in order.
 #[derive(Debug, Default)]
 pub(super) struct Loops {
-    rings: Vec<Vec<EdgeInput>>,
-}
-
-/// A face to be made, once everything is read.
-pub(super) struct Job {
-    /// The entry of the face.
-    pub at: usize,
-    /// The place of its entity in the document.
-    pub place: usize,
-    surface: Arc<Surface>,
-    kind: SurfaceKind,
     rings: Vec<Vec<EdgeInput>>,
 }
 
@@ -49,7 +39,7 @@ pub(super) struct FaceSurfaces {
 pub(super) type Edges = HashMap<(usize, usize, (usize, usize)), (u64, Arc<Curve>)>;
 
 impl Reader<'_> {
-    /// Opens a face: its loops are read here, and made by [`Reader::make_faces`] on all threads.
+    /// Opens a face: its loops are read here, and made at the end on all threads.
     pub(super) fn face(&mut self, at: usize, uses: &Uses) {
         let Some(surface_at) = uses.surface_of(at) else {
             return self.note(Severity::Skipped, at, "the surface that it trims does not exist");
@@ -60,8 +50,7 @@ impl Reader<'_> {
         if let Ok(loops) = &loops {
             // An unbounded surface reaches as far as the loops, which are in the coordinates of the model here.
             let back = map.map_or(DAffine3::IDENTITY, |m| m.inverse());
-            let curves = loops.rings.iter().flatten().filter_map(|p| p.curve.as_ref());
-            self.reach = curves.flat_map(|c| c.sampled(4)).map(|(_, p)| back.transform_point3(p)).collect();
+            self.reach = reach(&loops.rings).map(|p| back.transform_point3(p)).collect();
         }
         let read = self.surfaces_of_face(at, surface_at, map.as_ref());
         self.reach.clear();
@@ -104,7 +93,7 @@ impl Reader<'_> {
             ring::head_to_tail(&mut edges);
             rings.push(edges);
         }
-        self.faces.push(Job { at, place, surface, kind: surface_kind(kind), rings });
+        self.faces.push(FaceJob { name: at, at: place, surface, kind: surface_kind(kind), rings, oriented: false });
     }
 
     /// The surface under a face at its place. Faces that share one at the same place share it in memory too.
@@ -137,35 +126,6 @@ impl Reader<'_> {
             self.face_surfaces.insert(key, out.clone());
         }
         Ok(out)
-    }
-
-    /// Makes the faces that were read, in file order whatever the threads.
-    pub(super) fn make_faces(&mut self) {
-        use rayon::prelude::*;
-        let jobs = std::mem::take(&mut self.faces);
-        let made: Vec<_> = jobs
-            .par_iter()
-            .map(|job| ring::face(&job.surface, job.kind, &job.rings, &RingOptions::default()))
-            .collect();
-        for (job, made) in jobs.iter().zip(made) {
-            match made {
-                Ok(made) => {
-                    let size = job.surface.bounds().diagonal();
-                    if made.gap > 1e-3 * size {
-                        let reason = format!("its loops are open by up to {:.3e}; they were closed straight", made.gap);
-                        self.note(Severity::Warning, job.at, reason);
-                    }
-                    if made.off > 1e-4 * size {
-                        let reason = format!("its edges lie up to {:.3e} off its surface", made.off);
-                        self.note(Severity::Warning, job.at, reason);
-                    }
-                    if let Some(entity) = self.entities.get_mut(job.place) {
-                        entity.shape = Shape::Face(Arc::new(made.face));
-                    }
-                }
-                Err(reason) => self.note(Severity::Warning, job.at, format!("opened as its whole surface: {reason}")),
-            }
-        }
     }
 
     /// The map of everything that belongs to a face: its own transform and the model's scale.

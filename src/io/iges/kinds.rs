@@ -66,9 +66,9 @@ pub(super) fn unread(kind: i64, consumed: bool) -> (Severity, String) {
         308 | 408 => (Severity::Info, format!("{name}: its members are opened where it stands")),
         116 | 123 => (Severity::Info, format!("{name}: no curve or surface, left out")),
         108 => (Severity::Info, format!("{name}: unbounded, and no face uses it")),
-        402 => (Severity::Info, format!("{name}: its members are opened, the group is not kept")),
+        402 => (Severity::Info, format!("{name}: of views or drawings, no geometry; its members are opened")),
         404 | 406 | 410 | 422 => (Severity::Info, format!("{name}: no geometry, left out")),
-        132 | 130 if consumed => (Severity::Info, format!("{name}: only describes another entity")),
+        132 if consumed => (Severity::Info, format!("{name}: only describes another entity")),
         202..=230 => (Severity::Info, format!("{name}: no geometry of the model, left out")),
         _ => (Severity::Skipped, format!("{name}: this type is not read")),
     }

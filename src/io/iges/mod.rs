@@ -1,6 +1,6 @@
 //! IGES 5.3, fixed 80-column ASCII: surfaces 128, 114, 118, 120, 122, 140, planes and quadrics 108 and 190 to 198; trimmed
-//! faces 144, 143 and 510; curves 126, 112, 110, 106, 104, 102 and 100; with transforms 124, subfigures 308 and 408, units,
-//! colours 314 and names 406.
+//! faces 144, 143 and 510; curves 130, 126, 112, 110, 106, 104, 102 and 100; with transforms 124, subfigures 308 and 408,
+//! groups 402, units, colours 314 and names 406.
 //!
 //! Nothing in a file is trusted: counts are checked against the bytes that are there, pointers may lead nowhere
 //! or in circles, and whatever is wrong with one entity loses that entity only. Every entity either becomes
@@ -10,9 +10,11 @@ mod analytic;
 mod curves;
 mod directory;
 mod faces;
+mod groups;
 mod header;
 mod instances;
 mod kinds;
+mod offset_curve;
 mod params;
 mod power_basis;
 mod sections;
@@ -29,13 +31,14 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
-use self::instances::Instances;
-
 use self::directory::Directory;
+use self::groups::Groups;
 use self::header::Header;
+use self::instances::Instances;
 use self::params::Params;
 use self::sections::{Line, Sections};
 use self::uses::Uses;
+use super::faces::{FaceJob, make, show_all_if_all_are_hidden};
 use super::{ImportReport, Opened, Severity};
 use crate::kernel::geom::{Curve, Surface};
 use crate::model::document::{Document, Entity, EntityId, Shape};
@@ -104,6 +107,7 @@ pub fn read(bytes: &[u8]) -> Result<Opened, IgesError> {
         unfolding_left,
         instance: None,
         reach: Vec::new(),
+        groups: Groups::default(),
         faces: Vec::new(),
         face_surfaces: HashMap::new(),
         read_surfaces: HashSet::new(),
@@ -134,8 +138,10 @@ struct Reader<'a> {
     instance: Option<(usize, DAffine3)>,
     /// Points that the next unbounded surface must reach, in the coordinates of its record.
     reach: Vec<DVec3>,
+    /// Which entities belong together.
+    groups: Groups,
     /// Faces to be made at the end.
-    faces: Vec<faces::Job>,
+    faces: Vec<FaceJob<usize>>,
     /// Surfaces of faces by entry, transform of the face and subfigure.
     face_surfaces: HashMap<(usize, usize, usize), faces::FaceSurfaces>,
     read_surfaces: HashSet<usize>,
@@ -155,6 +161,7 @@ impl Reader<'_> {
     fn run(mut self) -> Opened {
         let uses = Uses::of(&mut self);
         let instances = Instances::of(&mut self);
+        self.groups = Groups::of(&mut self);
         for at in 0..self.directory.entries.len() {
             match instances.places(at) {
                 None => self.entity(at, &uses),
@@ -168,9 +175,11 @@ impl Reader<'_> {
                 }
             }
         }
-        self.make_faces();
+        for (at, reason) in make(&std::mem::take(&mut self.faces), &mut self.entities) {
+            self.note(Severity::Warning, at, reason);
+        }
         self.report.lines.sort_by_key(|l| l.line);
-        self.show_all_if_all_are_hidden();
+        show_all_if_all_are_hidden(&mut self.entities, &mut self.report);
         [self.report.surfaces, self.report.curves] = self.counts;
         Opened { document: Document::from_parts(self.header.unit, self.entities, 0), report: self.report }
     }
@@ -181,11 +190,16 @@ impl Reader<'_> {
         match entry.kind {
             128 | 114 | 118 | 120 | 122 | 140 | 190..=198 => self.surface(at, uses),
             108 if !uses.faces_of(at).is_empty() => self.surface(at, uses),
-            126 | 112 | 110 | 104 | 100 | 102 => self.free_curve(at, uses),
+            130 | 126 | 112 | 110 | 104 | 100 | 102 => self.free_curve(at, uses),
             106 if matches!(entry.form, 11..=13 | 63) => self.free_curve(at, uses),
             144 | 143 | 510 => self.face(at, uses),
             124 | 314 | 0 => {}
             406 if entry.form == 15 => {}
+            402 if matches!(entry.form, 1 | 7 | 14 | 15) => {
+                if let Some(reason) = self.groups.note(at) {
+                    self.note(Severity::Info, at, reason);
+                }
+            }
             kind => {
                 let (severity, reason) = kinds::unread(kind, uses.is_consumed(at));
                 self.note(severity, at, reason);
@@ -267,6 +281,7 @@ impl Reader<'_> {
                 118 => Geometry::Surfaces(vec![reader.ruled(form, params, depth, notes)?]),
                 140 => Geometry::Surfaces(vec![reader.offset(params, depth, notes)?]),
                 108 | 190 | 192 | 194 | 196 | 198 => Geometry::Surfaces(vec![reader.analytic(kind, form, params)?]),
+                130 => one(reader.offset_curve(params, depth, notes)?),
                 104 => one(analytic::conic(params)?),
                 106 => one(analytic::copious(form, params)?),
                 126 => Geometry::Curves(spline::curve(params, notes)?),
@@ -425,6 +440,11 @@ impl Reader<'_> {
         if parts > 1 {
             name = format!("{name} part {}", part + 1);
         }
+        let mut group = self.groups.path(owner);
+        if group.is_empty() {
+            group = self.groups.path(at);
+        }
+        let name = format!("{group}{name}");
         let color = self.color_of(owner).or_else(|| self.color_of(at));
         let visible = !self.directory.entries[owner].blanked;
         let id = EntityId(self.entities.len() as u64);
@@ -473,16 +493,6 @@ impl Reader<'_> {
         }
         self.colors.insert(pointer, color);
         color
-    }
-
-    /// A file in which everything is marked hidden would open as nothing.
-    fn show_all_if_all_are_hidden(&mut self) {
-        let all = self.entities.len();
-        if all == 0 || self.entities.iter().any(|e| e.visible) {
-            return;
-        }
-        self.entities.iter_mut().for_each(|e| e.visible = true);
-        self.report.add(Severity::Warning, "file", None, None, format!("all {all} entities are hidden; all are shown"));
     }
 }
 

@@ -1,13 +1,35 @@
 //! Typed access to instances: every failure says which instance, what was expected and what is there.
 
+use std::cell::Cell;
+
 use glam::DVec3;
 
 use super::part21::{Exchange, Instance, Record, Value};
+
+/// How often the bytes of a file may be read over again for assemblies, curves of curves and surfaces of many faces:
+/// without a limit a small file could unfold without end.
+const UNFOLDING: usize = 64;
+/// What a file may unfold to however small it is, in bytes.
+const LEAST: usize = 4_000_000;
+/// What a value of a statement counts for, in bytes.
+const VALUE: usize = 64;
+
+/// How much may still be unfolded.
+#[derive(Debug)]
+pub struct Budget(Cell<usize>);
+
+impl Budget {
+    /// That of a file of so many bytes.
+    pub fn of(bytes: usize) -> Self {
+        Self(Cell::new(UNFOLDING.saturating_mul(bytes).max(LEAST)))
+    }
+}
 
 /// Looks into the instances of a file.
 #[derive(Clone, Copy)]
 pub struct Access<'f, 'a> {
     exchange: &'f Exchange<'a>,
+    budget: &'f Budget,
     /// Radians in the unit of angles.
     angle: f64,
 }
@@ -17,8 +39,26 @@ pub type Problem = String;
 
 impl<'f, 'a> Access<'f, 'a> {
     /// Access to a file.
-    pub fn new(exchange: &'f Exchange<'a>) -> Self {
-        Self { exchange, angle: 1.0 }
+    pub fn new(exchange: &'f Exchange<'a>, budget: &'f Budget) -> Self {
+        Self { exchange, budget, angle: 1.0 }
+    }
+
+    /// Takes the values of an instance from what may still be unfolded.
+    pub fn unfold(&self, instance: &Instance<'_>) -> Result<(), Problem> {
+        let values: usize = instance.records.iter().flat_map(|r| &r.values).map(size).sum();
+        self.spend(1 + values)
+    }
+
+    /// Takes so many values from what may still be unfolded.
+    pub fn spend(&self, values: usize) -> Result<(), Problem> {
+        let left = self.budget.0.get().checked_sub(VALUE * values);
+        self.budget.0.set(left.unwrap_or(0));
+        left.map(|_| ()).ok_or_else(|| TOO_OFTEN.to_owned())
+    }
+
+    /// Whether nothing more may be unfolded.
+    pub fn is_spent(&self) -> bool {
+        self.budget.0.get() < VALUE
     }
 
     /// The same with another unit of angles.
@@ -53,7 +93,7 @@ impl<'f, 'a> Access<'f, 'a> {
         let values = list(record, 1)?;
         let mut out = DVec3::ZERO;
         for (k, value) in values.iter().take(3).enumerate() {
-            out[k] = real_of(value).ok_or_else(|| format!("#{number}: coordinate {k} is {value:?}"))?;
+            out[k] = real_of(value).ok_or_else(|| format!("#{number}: coordinate {k} is {}", shown(value)))?;
         }
         if out.is_finite() { Ok(out) } else { Err(format!("#{number}: {out} is not finite")) }
     }
@@ -69,10 +109,31 @@ impl<'f, 'a> Access<'f, 'a> {
     }
 }
 
+/// What is said where a file has unfolded too far.
+pub const TOO_OFTEN: &str = "the statements of this file refer to each other too often; what is left is not opened";
+
+/// How many values a value consists of.
+fn size(value: &Value<'_>) -> usize {
+    match value {
+        Value::List(values) | Value::Typed(_, values) => 1 + values.iter().map(size).sum::<usize>(),
+        _ => 1,
+    }
+}
+
+/// A value for a message. Lists may be as long as the file, so only their length is shown.
+fn shown(value: &Value<'_>) -> String {
+    match value {
+        Value::List(values) => format!("a list of {}", values.len()),
+        Value::Typed(name, values) => format!("{name} of {} values", values.len()),
+        Value::String(text) | Value::Enum(text) | Value::Binary(text) => text.chars().take(60).collect(),
+        other => format!("{other:?}"),
+    }
+}
+
 fn missing(record: &Record<'_>, at: usize, expected: &str) -> Problem {
     match record.values.get(at) {
         Some(value) => {
-            let shown: String = format!("{value:?}").chars().take(60).collect();
+            let shown = shown(value);
             format!("{}: value {} is {shown}, expected {expected}", record.name, at + 1)
         }
         None => format!("{}: {} values, expected {expected} as number {}", record.name, record.values.len(), at + 1),

@@ -12,8 +12,9 @@ use super::curves::placement;
 use super::part21::{Exchange, Value};
 use super::structure::{MAX_DEPTH, MAX_ITEMS};
 
-/// Every representation of shape with the places where it occurs.
-pub fn placed_representations(exchange: &Exchange<'_>, file: Access<'_, '_>) -> Vec<(u64, DAffine3)> {
+/// Every representation of shape with the places where it occurs; and the first that is left out, where they are nested
+/// deeper than [`MAX_DEPTH`], lead back to themselves, or are too many.
+pub fn placed_representations(exchange: &Exchange<'_>, file: Access<'_, '_>) -> (Vec<(u64, DAffine3)>, Option<u64>) {
     let is_shape = |n: &u64| {
         exchange.instances.get(n).is_some_and(|i| {
             i.records
@@ -53,10 +54,11 @@ pub fn placed_representations(exchange: &Exchange<'_>, file: Access<'_, '_>) -> 
         .collect();
     let group = |start: u64| {
         let mut all = vec![start];
+        let mut known = HashSet::from([start]);
         let mut at = 0;
         while at < all.len() {
             for &next in same.get(&all[at]).map_or(&[][..], Vec::as_slice) {
-                if !all.contains(&next) {
+                if known.insert(next) {
                     all.push(next);
                 }
             }
@@ -64,7 +66,7 @@ pub fn placed_representations(exchange: &Exchange<'_>, file: Access<'_, '_>) -> 
         }
         all
     };
-    let mut out = Vec::new();
+    let (mut out, mut left_out) = (Vec::new(), None);
     let mut done: HashSet<u64> = HashSet::new();
     for &start in exchange.order.iter().filter(|n| is_shape(n) && !mapped.contains(n)) {
         if done.contains(&start) {
@@ -82,14 +84,20 @@ pub fn placed_representations(exchange: &Exchange<'_>, file: Access<'_, '_>) -> 
                     out.push((member, place));
                 }
                 for (child, inner) in children.get(&member).map_or(&[][..], Vec::as_slice) {
-                    if depth < MAX_DEPTH && out.len() + stack.len() < MAX_ITEMS {
-                        stack.push((group(*child), place * *inner, depth + 1));
+                    let fits = depth < MAX_DEPTH && out.len() + stack.len() < MAX_ITEMS;
+                    if fits && file.spend(4).is_ok() {
+                        let members = group(*child);
+                        // Reading on beyond the limit would only take time.
+                        let _spent = file.spend(members.len());
+                        stack.push((members, place * *inner, depth + 1));
+                    } else {
+                        left_out.get_or_insert(*child);
                     }
                 }
             }
         }
     }
-    out
+    (out, left_out)
 }
 
 /// ITEM_DEFINED_TRANSFORMATION: from the frame of its first item to that of its second.

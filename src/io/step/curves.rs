@@ -8,7 +8,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::access::{self, Access, Problem, count, list, optional_reference, real, reals, reference, references};
 use super::part21::{Instance, Record, Value};
 use crate::kernel::geom::sweep::arc;
-use crate::kernel::geom::{Curve, Knots, analytic, chain};
+use crate::kernel::geom::{Curve, Knots, analytic, chain, fitted};
 
 /// How deep curves and surfaces may refer to one another.
 pub const MAX_DEPTH: usize = 16;
@@ -119,6 +119,7 @@ pub fn curve(file: Access<'_, '_>, number: u64, bounds: Bounds<'_>, depth: usize
     if depth > MAX_DEPTH {
         return Err(format!("#{number}: curves refer to one another more than {MAX_DEPTH} deep"));
     }
+    file.unfold(instance)?;
     let text = |e: &dyn std::fmt::Display| format!("#{number} {}: {e}", instance.type_name());
     let cut = |whole: Curve| match bounds {
         Bounds::Ends([a, b]) => {
@@ -216,6 +217,23 @@ pub fn curve(file: Access<'_, '_>, number: u64, bounds: Bounds<'_>, depth: usize
                 pieces.push(if same_sense { piece } else { piece.reversed() });
             }
             cut(chain::concatenated(&pieces).map_err(|e| text(&e))?)
+        }
+        "OFFSET_CURVE_3D" => {
+            let (basis, distance) = (reference(record, 1)?, real(record, 2)?);
+            let across = file.direction(reference(record, 4)?)?;
+            // A line is bounded by the ends, moved back; a conic's ends are at the same angles; others are cut.
+            let on_basis = match (bounds, file.record(basis, &["LINE"])) {
+                (Bounds::Ends([a, b]), Ok(_)) => {
+                    let aside = across.cross(b - a).normalize_or_zero() * distance;
+                    Bounds::Ends([a - aside, b - aside])
+                }
+                (Bounds::Ends(_), _) if file.record(basis, &["CIRCLE"]).is_ok() => bounds,
+                (Bounds::Ends(_), _) => Bounds::Own,
+                _ => bounds,
+            };
+            let basis = curve(file, basis, on_basis, depth + 1)?;
+            let made = fitted::offset_curve(&basis, across, &|_| [distance, 0.0]).map_err(|e| text(&e))?;
+            cut(made.curve)
         }
         "TRIMMED_CURVE" => {
             let trimmed = trimmed(file, record, depth).map_err(|e| text(&e))?;

@@ -12,9 +12,8 @@ use glam::{DAffine3, DVec3};
 
 use super::access::{self, Access, Problem, reference, references};
 use super::curves::{Bounds, curve, segments};
-use crate::kernel::geom::ring::{self, EdgeInput, MadeFace, RingError, RingOptions};
-use crate::kernel::geom::trim::SurfaceKind;
-use crate::kernel::geom::{Curve, Surface};
+use crate::kernel::geom::Curve;
+use crate::kernel::geom::ring::{self, EdgeInput};
 
 /// The number of an edge and its curve.
 type KnownEdge = (u64, Arc<Curve>);
@@ -30,31 +29,6 @@ impl Edges {
     fn next(&mut self) -> u64 {
         self.next += 1;
         self.next
-    }
-}
-
-/// A face that was read and is still to be made.
-#[derive(Debug)]
-pub struct FaceJob {
-    /// Its statement.
-    pub number: u64,
-    /// The place of its entity in the document.
-    pub at: usize,
-    /// Its surface.
-    pub surface: Arc<Surface>,
-    /// What that was.
-    pub kind: SurfaceKind,
-    /// Its loops, counter-clockwise on the surface where the file can be trusted.
-    pub rings: Vec<Vec<EdgeInput>>,
-    /// Whether the file says how loops run.
-    pub oriented: bool,
-}
-
-impl FaceJob {
-    /// Makes the face.
-    pub fn run(&self) -> Result<MadeFace, RingError> {
-        let options = RingOptions { oriented: self.oriented, ..RingOptions::default() };
-        ring::face(&self.surface, self.kind, &self.rings, &options)
     }
 }
 
@@ -102,6 +76,7 @@ fn edge_loop(
     let ring = file.record(number, &["EDGE_LOOP"])?;
     let mut out = Vec::new();
     for oriented in references(ring, 1)? {
+        file.spend(1)?;
         let oriented = file.record(oriented, &["ORIENTED_EDGE"])?;
         let (edge, forward) = (reference(oriented, 3)?, access::is_true(oriented, 4));
         let key = (edge, 0, at);
@@ -137,6 +112,7 @@ fn poly_loop(
     let mut points = references(file.record(number, &["POLY_LOOP"])?, 1)?;
     points.dedup();
     let mut out = Vec::new();
+    file.spend(points.len())?;
     for (k, &a) in points.iter().enumerate() {
         let b = points[(k + 1) % points.len()];
         if a == b {
@@ -180,11 +156,6 @@ pub fn bounded(
         }
     }
     Ok(rings)
-}
-
-/// Points on the loops: what an unbounded surface must reach.
-pub fn reach(rings: &[Vec<EdgeInput>]) -> Vec<DVec3> {
-    rings.iter().flatten().filter_map(|e| e.curve.as_ref()).flat_map(|c| c.sampled(4)).map(|(_, p)| p).collect()
 }
 
 /// The points of the vertex loops of a face.

@@ -12,6 +12,9 @@ use std::collections::HashMap;
 /// How deep lists may be nested.
 pub const MAX_DEPTH: usize = 64;
 
+/// What a file ends with.
+const END: &str = "END-ISO-10303-21";
+
 /// A value of an instance.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value<'a> {
@@ -89,6 +92,8 @@ pub struct Exchange<'a> {
     pub order: Vec<u64>,
     /// Statements that could not be read.
     pub faults: Vec<Fault>,
+    /// Whether the file ends as it should, with `END-ISO-10303-21;`.
+    pub ended: bool,
 }
 
 /// Whether this text is a STEP file.
@@ -133,7 +138,7 @@ pub fn parse(text: &str) -> Exchange<'_> {
             match scanner.record() {
                 Ok(record) if !in_data => out.header.push(record),
                 Ok(_) => {}
-                Err(_) if is_keyword(&text[start..]) => {}
+                Err(_) if is_keyword(&text[start..]) => out.ended |= text[start..].starts_with(END),
                 Err(reason) => out.faults.push(Fault { number: None, line, reason }),
             }
             scanner.skip_statement();
@@ -144,7 +149,7 @@ pub fn parse(text: &str) -> Exchange<'_> {
 
 /// Statements without parentheses that frame the sections.
 fn is_keyword(rest: &str) -> bool {
-    ["ISO-10303-21", "END-ISO-10303-21", "HEADER", "DATA", "ENDSEC", "ANCHOR", "REFERENCE", "SIGNATURE"]
+    ["ISO-10303-21", END, "HEADER", "DATA", "ENDSEC", "ANCHOR", "REFERENCE", "SIGNATURE"]
         .iter()
         .any(|k| rest.starts_with(k))
 }

@@ -4,16 +4,16 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
-use rayon::prelude::*;
 
-use super::access::{Access, Problem, optional_reference, reference, references};
+use super::access::{Access, Budget, Problem, TOO_OFTEN, optional_reference, reference, references};
 use super::assembly::placed_representations;
 use super::curves::{self, Bounds};
-use super::faces::{self, Edges, FaceJob};
+use super::faces::{self, Edges};
 use super::part21::{self, Exchange, Value};
 use super::style::Styles;
 use super::surfaces;
 use super::units::{ContextUnits, units};
+use crate::io::faces::{FaceJob, make, reach, show_all_if_all_are_hidden};
 use crate::io::report::{ImportReport, Severity};
 use crate::kernel::geom::trim::SurfaceKind;
 use crate::model::document::{Document, Entity, EntityId, Shape};
@@ -35,10 +35,15 @@ pub fn read(text: &str, report: &mut ImportReport) -> Document {
             &fault.reason,
         );
     }
+    if !exchange.ended {
+        let reason = "it does not end with END-ISO-10303-21; the file may be cut off";
+        report.add(Severity::Warning, "file", None, None, reason);
+    }
     for instance in exchange.instances.values() {
         *report.found.entry(instance.type_name()).or_default() += 1;
     }
-    let file = Access::new(&exchange);
+    let budget = Budget::of(text.len());
+    let file = Access::new(&exchange, &budget);
     let (unit, factors) = units(&exchange, file, report);
     let styles = Styles::of(&exchange, file);
     let mut walk = Walk {
@@ -52,17 +57,28 @@ pub fn read(text: &str, report: &mut ImportReport) -> Document {
         jobs: Vec::new(),
         edges: Edges::default(),
         items: 0,
+        is_cut: false,
         places: 0,
     };
-    for (representation, place) in placed_representations(&exchange, file) {
+    let (placed, left_out) = placed_representations(&exchange, file);
+    if let Some(number) = left_out {
+        let reason = format!(
+            "assemblies are nested deeper than {MAX_DEPTH} or lead back to themselves, or parts stand at too many \
+             places; from this part on some are left out"
+        );
+        walk.skip(number, reason);
+    }
+    for (representation, place) in placed {
         let name = walk.styles.names.get(&representation).cloned().unwrap_or_default();
         let manner = Manner { name, color: walk.styles.colors.get(&representation).copied(), visible: true };
         walk.representation(representation, place, &manner, 0);
     }
-    walk.make_faces();
+    for (number, reason) in make(&std::mem::take(&mut walk.jobs), &mut walk.entities) {
+        walk.warn(number, reason);
+    }
     walk.report.lines.sort_by_key(|l| l.line);
     walk.rest();
-    walk.show_all_if_all_are_hidden();
+    show_all_if_all_are_hidden(&mut walk.entities, walk.report);
     Document::from_parts(unit, walk.entities, 0)
 }
 
@@ -76,9 +92,11 @@ struct Walk<'r, 'f, 'a> {
     styles: Styles,
     met: HashSet<u64>,
     /// Faces to be made at the end.
-    jobs: Vec<FaceJob>,
+    jobs: Vec<FaceJob<u64>>,
     edges: Edges,
     items: usize,
+    /// Whether the file has unfolded too far.
+    is_cut: bool,
     /// How many placed representations there were: edges are shared inside one only.
     places: usize,
 }
@@ -106,13 +124,18 @@ impl Walk<'_, '_, '_> {
         else {
             return;
         };
-        let context = optional_reference(record, 2).and_then(|c| self.factors.get(&c)).copied().unwrap_or_default();
+        let context = optional_reference(record, 2).and_then(|c| self.factors.get(&c)).copied();
+        let items = references(record, 1).unwrap_or_default();
+        if context.is_none() && !self.factors.is_empty() && !items.is_empty() {
+            self.warn(number, "its context names no unit; its lengths are taken as those of the document");
+        }
+        let context = context.unwrap_or_default();
         // Lengths of the context become lengths of the document behind the placement.
         let place = place * DAffine3::from_scale(DVec3::splat(context.length));
         let outer = self.file;
         self.file = outer.with_angle(context.angle);
         self.places += 1;
-        for item in references(record, 1).unwrap_or_default() {
+        for item in items {
             self.item(item, &place, manner, depth + 1);
         }
         self.file = outer;
@@ -123,6 +146,13 @@ impl Walk<'_, '_, '_> {
         if depth > MAX_DEPTH || self.items > MAX_ITEMS {
             if depth == MAX_DEPTH + 1 || self.items == MAX_ITEMS + 1 {
                 self.skip(number, format!("nested deeper than {MAX_DEPTH} or more than {MAX_ITEMS} placed items"));
+            }
+            return;
+        }
+        if self.file.is_spent() || self.file.spend(1).is_err() {
+            if !self.is_cut {
+                self.is_cut = true;
+                self.skip(number, TOO_OFTEN);
             }
             return;
         }
@@ -250,14 +280,9 @@ impl Walk<'_, '_, '_> {
         oriented: bool,
     ) {
         let back = place.inverse();
-        let mut reach: Vec<DVec3> = rings
-            .as_ref()
-            .map_or_else(|_| Vec::new(), |r| faces::reach(r))
-            .into_iter()
-            .map(|p| back.transform_point3(p))
-            .collect();
-        reach.extend(vertices);
-        let surface = match surfaces::surface(self.file, basis, &reach, 0) {
+        let on_loops = rings.iter().flat_map(|rings| reach(rings)).map(|p| back.transform_point3(p));
+        let to_reach: Vec<DVec3> = on_loops.chain(vertices).collect();
+        let surface = match surfaces::surface(self.file, basis, &to_reach, 0) {
             Ok(surface) => Arc::new(surface.transformed(place)),
             Err(reason) => return self.skip(number, reason),
         };
@@ -265,7 +290,7 @@ impl Walk<'_, '_, '_> {
         let Some(at) = self.add(number, manner, Shape::Surface(Arc::clone(&surface))) else { return };
         match rings {
             Ok(rings) if rings.is_empty() => {}
-            Ok(rings) => self.jobs.push(FaceJob { number, at, surface, kind, rings, oriented }),
+            Ok(rings) => self.jobs.push(FaceJob { name: number, at, surface, kind, rings, oriented }),
             Err(reason) => self.warn(number, format!("opened as its whole surface: {reason}")),
         }
     }
@@ -274,40 +299,6 @@ impl Walk<'_, '_, '_> {
         let instance = self.exchange.instances.get(&number);
         let (kind, line) = instance.map_or(("STEP".to_owned(), None), |i| (i.type_name(), Some(i.line)));
         self.report.add(Severity::Warning, kind, Some(number as usize), line, reason);
-    }
-
-    /// Makes the faces that were read, in file order whatever the threads.
-    fn make_faces(&mut self) {
-        let jobs = std::mem::take(&mut self.jobs);
-        let made: Vec<_> = jobs.par_iter().map(FaceJob::run).collect();
-        for (job, made) in jobs.iter().zip(made) {
-            match made {
-                Ok(made) => {
-                    let size = job.surface.bounds().diagonal();
-                    if made.gap > 1e-3 * size {
-                        let reason = format!("its loops are open by up to {:.3e}; they were closed straight", made.gap);
-                        self.warn(job.number, reason);
-                    }
-                    if made.off > 1e-4 * size {
-                        self.warn(job.number, format!("its edges lie up to {:.3e} off its surface", made.off));
-                    }
-                    if let Some(entity) = self.entities.get_mut(job.at) {
-                        entity.shape = Shape::Face(Arc::new(made.face));
-                    }
-                }
-                Err(reason) => self.warn(job.number, format!("opened as its whole surface: {reason}")),
-            }
-        }
-    }
-
-    /// A file in which everything is marked hidden would open as nothing.
-    fn show_all_if_all_are_hidden(&mut self) {
-        let all = self.entities.len();
-        if all == 0 || self.entities.iter().any(|e| e.visible) {
-            return;
-        }
-        self.entities.iter_mut().for_each(|e| e.visible = true);
-        self.report.add(Severity::Warning, "file", None, None, format!("all {all} entities are hidden; all are shown"));
     }
 
     /// The representation of a MAPPED_ITEM and where it goes.

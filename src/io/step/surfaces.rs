@@ -33,6 +33,7 @@ pub fn surface(file: Access<'_, '_>, number: u64, reach: &[DVec3], depth: usize)
     if depth > MAX_DEPTH {
         return Err(format!("#{number}: surfaces refer to one another more than {MAX_DEPTH} deep"));
     }
+    file.unfold(instance)?;
     let text = |e: &dyn std::fmt::Display| format!("#{number} {}: {e}", instance.type_name());
     if let Some(s) = spline(instance, "SURFACE") {
         return spline_surface(file, &s).map_err(|e| text(&e));

@@ -10,6 +10,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{DAffine3, DVec2, DVec3};
 
+use super::arc_length::ArcLength;
+use super::fitted::{Fitted, paced};
 use super::sweep::{SweepError, arc, revolved};
 use super::{Curve, CurveError, Knots, Surface};
 
@@ -222,6 +224,31 @@ pub fn ruled(first: &Curve, second: &Curve) -> Result<Surface, SweepError> {
     });
     let points = [first.points(), second.points()].concat();
     Ok(Surface::new(first.knots().clone(), across, points, weights)?)
+}
+
+/// The surface of the lines between two curves at equal fractions of their arc lengths, and how far off that the second
+/// curve is. Where equal parameters are equal fractions already, it is exact; else the curve of lower degree is
+/// replaced by one that keeps pace with the other.
+pub fn ruled_by_length(first: &Curve, second: &Curve) -> Result<(Surface, f64), SweepError> {
+    let lengths = [first, second].map(ArcLength::new);
+    let fraction = |k: usize, curve: &Curve, s: f64| {
+        let [a, b] = curve.domain();
+        lengths[k].length_at(curve, a + (b - a) * s) / lengths[k].length()
+    };
+    let same = (1..64).all(|i| {
+        let s = f64::from(i) / 64.0;
+        (fraction(0, first, s) - fraction(1, second, s)).abs() <= 1e-9
+    });
+    if same || lengths.iter().any(|l| !(l.length() > 0.0)) {
+        return Ok((ruled(first, second)?, 0.0));
+    }
+    if first.knots().degree() >= second.knots().degree() {
+        let Fitted { curve, off } = paced(second, first)?;
+        Ok((ruled(first, &curve)?, off))
+    } else {
+        let Fitted { curve, off } = paced(first, second)?;
+        Ok((ruled(&curve, second)?, off))
+    }
 }
 
 /// How closely an offset surface is followed, as a fraction of its size.

@@ -15,6 +15,7 @@ pub mod closest;
 pub mod closest_curve;
 mod curve;
 mod differential;
+pub mod fitted;
 mod knots;
 pub mod pcurve;
 #[cfg(test)]

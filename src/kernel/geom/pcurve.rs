@@ -12,10 +12,8 @@
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::chart::Chart;
+use super::fitted::{MAX_DEPTH, fitted};
 use super::{Curve, CurveError, Knots};
-
-/// How often one piece may be halved.
-const MAX_DEPTH: usize = 12;
 
 /// A parameter curve and how far the curve in space is from the surface.
 #[derive(Clone, Debug)]
@@ -215,29 +213,13 @@ fn joined(breaks: &[f64], pieces: &[[DVec2; 4]]) -> Result<Curve, CurveError> {
 /// The curve in space of a parameter curve, with its parameter.
 pub fn lift(chart: &Chart<'_>, pcurve: &Curve, tol: f64) -> Result<Curve, CurveError> {
     let ts = starts(pcurve);
-    let jet = |t: f64| {
+    let slope = |t: f64| {
         let [uv, d, ..] = pcurve.derivatives(t, 1);
         let jet = chart.surface().jet(chart.wrapped(uv.truncate()), 1);
-        (jet.p(), jet.u() * d.x + jet.v() * d.y)
+        jet.u() * d.x + jet.v() * d.y
     };
-    let mut breaks = vec![ts[0]];
-    let mut points = vec![jet(ts[0]).0];
-    let mut stack: Vec<([f64; 2], usize)> = ts.windows(2).rev().map(|w| ([w[0], w[1]], MAX_DEPTH)).collect();
-    while let Some(([a, b], depth)) = stack.pop() {
-        let (h, t) = (b - a, 0.5 * (a + b));
-        let inside = 1e-9 * h;
-        let (pa, pb) = (chart.eval(uv_at(pcurve, a)), chart.eval(uv_at(pcurve, b)));
-        let piece = [pa, pa + jet(a + inside).1 * (h / 3.0), pb - jet(b - inside).1 * (h / 3.0), pb];
-        let error = middle_of(&piece).distance(chart.eval(uv_at(pcurve, t)));
-        if error > tol && depth > 0 && t > a && t < b {
-            stack.push(([t, b], depth - 1));
-            stack.push(([a, t], depth - 1));
-        } else {
-            breaks.push(b);
-            points.extend(&piece[1..]);
-        }
-    }
-    Curve::new(Knots::clamped(3, &breaks, 3)?, points, None)
+    let point = |t: f64| chart.eval(uv_at(pcurve, t));
+    Ok(fitted(&ts, &point, &slope, tol, MAX_DEPTH)?.curve)
 }
 
 #[cfg(test)]
