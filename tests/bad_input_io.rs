@@ -2,63 +2,24 @@
 //! where. No panic, no hang, and no more memory than a multiple of the file.
 
 #![allow(clippy::unwrap_used, reason = "a test helper may stop the test")]
-#![allow(unsafe_code, reason = "measuring memory needs an allocator, which is an unsafe trait")]
 
+#[path = "support/fuzzed.rs"]
+mod fuzzed;
 #[path = "support/iges_text.rs"]
 mod iges_text;
+#[path = "support/peak.rs"]
+mod peak;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::io::Write;
 use std::sync::Arc;
 
+use fuzzed::checked;
 use glam::DVec3;
-use iges_text::{Entity, File, shared_files, square};
-use patchwright::io::{self, Opened, iges, project, step};
+use iges_text::{Entity, File, one_of_each, shared_files, square};
+use patchwright::io::{self, Format, Opened, iges, project, step};
 use patchwright::kernel::geom::{Knots, Surface};
 use patchwright::model::document::{Document, Shape, Unit};
-
-/// Counts the bytes that the current thread holds, so that tests can run side by side.
-struct Counting;
-
-thread_local! {
-    static HELD: Cell<isize> = const { Cell::new(0) };
-    static PEAK: Cell<isize> = const { Cell::new(0) };
-}
-
-fn count(change: isize) {
-    // During the end of a thread there is nothing left to count in.
-    let _ = HELD.try_with(|held| {
-        held.set(held.get() + change);
-        let _ = PEAK.try_with(|peak| peak.set(peak.get().max(held.get())));
-    });
-}
-
-// SAFETY: every call is passed on unchanged to the system's allocator.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count(layout.size() as isize);
-        // SAFETY: the caller keeps the contract of `alloc`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        count(-(layout.size() as isize));
-        // SAFETY: the pointer came from `alloc` above, hence from the system.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-/// Runs `f` and gives the most bytes that it held at once.
-fn peak<T>(f: impl FnOnce() -> T) -> (T, usize) {
-    let before = HELD.with(Cell::get);
-    PEAK.with(|peak| peak.set(before));
-    let result = f();
-    (result, usize::try_from(PEAK.with(Cell::get) - before).unwrap())
-}
+use peak::peak;
 
 /// Reads IGES and holds it to 30 times the file's size, and a little for the smallest files.
 fn read_iges(bytes: &[u8]) -> Option<Opened> {
@@ -76,91 +37,15 @@ fn read_iges(bytes: &[u8]) -> Option<Opened> {
     }
 }
 
-/// What holds of every document: it is finite, and evaluating it is too.
-fn checked(opened: &Opened) {
-    for entity in opened.document.entities() {
-        assert!(entity.bounds().max_abs().is_finite());
-        if let Some(surface) = entity.surface() {
-            let [u, v] = surface.domain();
-            let _ = surface.eval(glam::DVec2::new(u[0], v[1]));
-        }
-        if let Some(curve) = entity.curve() {
-            let _ = curve.ends();
-        }
-    }
-}
-
 fn random(state: &mut u64) -> u64 {
     *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
     *state >> 33
 }
 
-/// A file with every kind of entity that the reader knows.
-fn one_of_each() -> File {
-    let mut file = File::default();
-    let name = file.add_entity(Entity { kind: 406, form: 15, parameters: "1,4Hname".into(), ..Entity::default() });
-    let color = file.add(314, "10.,20.,30.") as i64;
-    let map = file.add(124, "1.,0.,0.,1.,0.,1.,0.,2.,0.,0.,1.,3.");
-    let parameters = format!("{},0,1,{name}", square(1.0));
-    let s = file.add_entity(Entity { kind: 128, transform: map, color: -color, parameters, ..Entity::default() });
-    let line = file.add(110, "0.,0.,0.,1.,0.,0.");
-    let arc = file.add(100, "0.,0.,0.,1.,0.,0.,1.");
-    let chain = file.add(102, format!("2,{line},{arc}"));
-    let on = file.add(142, format!("0,{s},{chain},{chain},3"));
-    file.add(144, format!("{s},1,1,{on},{on}"));
-    let boundary = file.add(141, format!("0,3,{s},1,{line},1,1,{arc}"));
-    file.add(143, format!("0,{s},1,{boundary}"));
-    file.add(126, "2,2,0,0,1,0,0.,0.,0.,1.,1.,1.,1.,.5,1.,0.,0.,0.,1.,0.,0.,1.,1.,0.,0.,1.");
-    let row = |n: usize| vec!["0.5"; n].join(",");
-    file.add(112, format!("3,2,3,1,0.,1.,{}", row(24)));
-    file.add(114, format!("3,1,1,1,0.,1.,0.,1.,{}", row(192)));
-    file.add(120, format!("{line},{arc},0.,1."));
-    file.add(122, format!("{arc},0.,0.,1."));
-    file.add(502, "1,0.,0.,0.");
-    let edges = file.add(504, format!("1,{line},1,1,1,1"));
-    let ring = file.add(508, format!("1,0,{edges},1,1,1,0,{arc}"));
-    let face = file.add(510, format!("{s},1,1,{ring}"));
-    let shell = file.add(514, format!("1,{face},1"));
-    file.add(186, format!("{shell},1,0"));
-    file.add(402, format!("2,{line},{arc}"));
-    // A real outline, a plane, quadrics, ruled and offset surfaces, conics, polylines, a subfigure.
-    let outline: Vec<String> = [[0.1, 0.1], [0.9, 0.1], [0.9, 0.9], [0.1, 0.1]]
-        .windows(2)
-        .map(|p| file.add(110, format!("{:?},{:?},1.,{:?},{:?},1.", p[0][0], p[0][1], p[1][0], p[1][1])).to_string())
-        .collect();
-    let outline = file.add(102, format!("3,{}", outline.join(",")));
-    let point = file.add(116, "0.,0.,1.,0");
-    let axis = file.add(123, "0.,0.,1.");
-    let plane = file.add(190, format!("{point},{axis}"));
-    let on = file.add(142, format!("0,{plane},0,{outline},2"));
-    let trimmed = file.add(144, format!("{plane},1,0,{on}"));
-    let drum = file.add(192, format!("{point},{axis},2."));
-    let rims = [0.0, 1.0].map(|z| file.add(100, format!("{z:?},0.,0.,2.,0.,2.,0.")));
-    let rims = rims.map(|c| file.add(142, format!("0,{drum},0,{c},2")));
-    file.add(144, format!("{drum},1,1,{},{}", rims[0], rims[1]));
-    file.add(196, format!("{point},2."));
-    file.add(198, format!("{point},{axis},3.,1."));
-    let ruled = file.add(118, format!("{line},{arc},0,0"));
-    file.add(140, format!("0.,0.,1.,.5,{ruled}"));
-    file.add_entity(Entity {
-        kind: 104,
-        form: 1,
-        parameters: "1.,0.,4.,0.,0.,-4.,0.,2.,0.,0.,1.".into(),
-        ..Entity::default()
-    });
-    file.add_entity(Entity { kind: 106, form: 12, parameters: "2,2,0.,0.,0.,1.,1.,1.".into(), ..Entity::default() });
-    let subfigure = file.add(308, format!("0,1Hs,1,{trimmed}"));
-    for place in ["0.,0.,9.,1.", "0.,0.,9.,2."] {
-        file.add(408, format!("{subfigure},{place}"));
-    }
-    file.add(110, "5.,0.,0.,1.,0.,0.");
-    file
-}
-
 #[test]
 fn a_file_with_one_of_each_is_read_whole() {
     let opened = read_iges(one_of_each().text().as_bytes()).unwrap();
-    assert_eq!((opened.report.surfaces, opened.report.curves), (12, 5), "{:?}", opened.report.lines);
+    assert_eq!((opened.report.surfaces, opened.report.curves), (12, 6), "{:?}", opened.report.lines);
 }
 
 #[test]
@@ -395,4 +280,30 @@ fn damaged_projects_say_where() {
         read_project(deep.repeat(100_000).as_bytes());
     }
     read_project(text.replacen("degree:3", "degree:18446744073709551615", 1).as_bytes());
+}
+
+/// What the fuzz targets (tests/fuzz) found, and what was kept with it.
+#[test]
+fn findings_are_survived() {
+    let folder = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data"));
+    let formats = [
+        ("iges", Some(Format::Iges)),
+        ("step", Some(Format::Step)),
+        ("project", Some(Format::Project)),
+        ("spec", None),
+        ("stl", Some(Format::Stl)),
+        ("obj", Some(Format::Obj)),
+        ("plot3d", Some(Format::Plot3d)),
+    ];
+    for (name, format) in formats {
+        let Ok(files) = std::fs::read_dir(folder.join(format!("{name}_findings"))) else { continue };
+        for path in files.map(|f| f.unwrap().path()) {
+            let bytes = std::fs::read(&path).unwrap();
+            println!("{}", path.display());
+            match format {
+                Some(format) => fuzzed::read(&bytes, format),
+                None => fuzzed::read_spec(&bytes),
+            }
+        }
+    }
 }

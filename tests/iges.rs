@@ -453,3 +453,114 @@ fn polynomial_surfaces_are_written_as_such_and_unclamped_knots_clamped() {
         }
     }
 }
+
+#[test]
+fn offset_curves_are_as_far_off_as_they_say_and_on_their_side() {
+    let mut file = File::default();
+    let part = |file: &mut File, kind: i64, parameters: &str| {
+        let parameters = parameters.to_owned();
+        file.add_entity(Entity { kind, status: Some("00010000"), parameters, ..Entity::default() })
+    };
+    // A quarter of a circle of radius 2 at z = 1, counter-clockwise: V x T points to its centre.
+    let arc = part(&mut file, 100, "1.,0.,0.,2.,0.,0.,2.");
+    let line = part(&mut file, 110, "0.,0.,0.,4.,0.,0.");
+    // The distance as y of a curve: 1 at parameter 0, 3 at parameter 1.
+    let height = part(&mut file, 110, "0.,1.,0.,0.,3.,0.");
+    let quarter = std::f64::consts::FRAC_PI_2;
+    file.add(130, format!("{arc},1,0,0,0,0.5,0.,0.,0.,0.,0.,1.,0.,{quarter}"));
+    file.add(130, format!("{arc},1,0,0,0,0.5,0.,0.,0.,0.,0.,-1.,0.,{quarter}"));
+    // Linear in the arc length, linear in the parameter, along a half of the line, by a function.
+    file.add(130, format!("{line},2,0,0,1,1.,0.,3.,4.,0.,0.,1.,0.,1."));
+    file.add(130, format!("{line},2,0,0,2,1.,0.,3.,1.,0.,0.,1.,0.,1."));
+    file.add(130, format!("{line},1,0,0,0,1.,0.,0.,0.,0.,0.,1.,0.,0.5"));
+    file.add(130, format!("{line},3,{height},2,2,0.,0.,0.,0.,0.,0.,1.,0.,1."));
+    let opened = read(&file);
+    assert_eq!(opened.report.curves, 6, "{:?}", opened.report.lines);
+    for (number, radius) in [(0, 1.5), (1, 2.5)] {
+        for (_, p) in curve(&opened, number).sampled(7) {
+            assert!((p.truncate().length() - radius).abs() < 1e-6 && (p.z - 1.0).abs() < 1e-12, "{p}");
+        }
+    }
+    for number in [2, 3, 5] {
+        for (_, p) in curve(&opened, number).sampled(7) {
+            assert!((p.y - (1.0 + 0.5 * p.x)).abs() < 1e-12, "{number}: {p}");
+        }
+        assert!((curve(&opened, number).ends()[1].x - 4.0).abs() < 1e-12);
+    }
+    assert_eq!(curve(&opened, 4).ends(), [DVec3::new(0.0, 1.0, 0.0), DVec3::new(2.0, 1.0, 0.0)]);
+    // What has no offset has a line in the report.
+    let mut file = File::default();
+    let line = part(&mut file, 110, "0.,0.,0.,4.,0.,0.");
+    let bend = part(&mut file, 106, "1,3,0.,0.,0.,1.,0.,1.,1.");
+    file.entities[bend / 2].form = 11;
+    for bad in [
+        format!("{line},1,0,0,0,1.,0.,0.,0.,1.,0.,0.,0.,1."),
+        format!("{line},7,0,0,0,1.,0.,0.,0.,0.,0.,1.,0.,1."),
+        format!("{line},2,0,0,1,1.,2.,3.,2.,0.,0.,1.,0.,1."),
+        format!("{line},3,0,9,1,1.,2.,3.,2.,0.,0.,1.,0.,1."),
+        format!("{line},1,0,0,0,1.,0.,0.,0.,0.,0.,1.,5.,6."),
+        format!("{bend},1,0,0,0,1.,0.,0.,0.,0.,0.,1.,0.,0."),
+    ] {
+        file.add(130, bad);
+    }
+    let own = 2 * file.entities.len() + 1;
+    file.add(130, format!("{own},1,0,0,0,1.,0.,0.,0.,0.,0.,1.,0.,1."));
+    let opened = read(&file);
+    assert_eq!(opened.report.curves, 0);
+    assert_eq!(opened.report.count(Severity::Skipped), 6, "{:?}", opened.report.lines);
+    // The one that is its own base only describes an entity.
+    assert!(opened.report.lines.iter().any(|l| l.at == Some(own)), "{:?}", opened.report.lines);
+}
+
+#[test]
+fn ruled_surfaces_join_equal_arc_lengths_or_equal_parameters_by_their_form() {
+    // A parabola that starts slowly, and a straight line of even speed above it.
+    let uneven = "2,2,0,0,1,0,0.,0.,0.,1.,1.,1.,1.,1.,1.,0.,0.,0.,0.1,0.,0.,1.,0.,0.,0.,1.";
+    for form in [0, 1] {
+        let mut file = File::default();
+        let parts = [(126, uneven), (110, "0.,0.,1.,1.,0.,1.")].map(|(kind, parameters)| {
+            let parameters = parameters.to_owned();
+            file.add_entity(Entity { kind, status: Some("00010000"), parameters, ..Entity::default() })
+        });
+        let parameters = format!("{},{},0,0", parts[0], parts[1]);
+        file.add_entity(Entity { kind: 118, form, parameters, ..Entity::default() });
+        let opened = read(&file);
+        let made = surface(&opened, 0);
+        for k in 0..=20 {
+            let u = f64::from(k) / 20.0;
+            let [low, high] = [0.0, 1.0].map(|v| made.eval(DVec2::new(u, v)));
+            let x = 0.2 * u * (1.0 - u) + u * u;
+            assert!((low.x - x).abs() < 1e-12, "the curve itself is kept: {low} {x}");
+            let above = if form == 0 { x } else { u };
+            assert!((high.x - above).abs() < 1e-8, "form {form} at {u}: {high}, expected {above}");
+        }
+    }
+}
+
+#[test]
+fn members_of_groups_bear_the_names_of_their_groups() {
+    let mut file = File::default();
+    let names: Vec<usize> = ["4Hwing", "3Hrib"]
+        .iter()
+        .map(|n| file.add_entity(Entity { kind: 406, form: 15, parameters: format!("1,{n}"), ..Entity::default() }))
+        .collect();
+    let s: Vec<usize> = (0..4).map(|k| file.add(128, square(f64::from(k)))).collect();
+    let group = |file: &mut File, form, parameters: String| {
+        file.add_entity(Entity { kind: 402, form, parameters, ..Entity::default() })
+    };
+    let rib = group(&mut file, 14, format!("2,{},{},0,1,{}", s[1], s[2], names[1]));
+    group(&mut file, 7, format!("2,{},{rib},0,1,{}", s[0], names[0]));
+    group(&mut file, 1, format!("2,{},999", s[3]));
+    // Two groups that contain one another.
+    let next = 2 * file.entities.len() + 1;
+    group(&mut file, 15, format!("1,{}", next + 2));
+    group(&mut file, 15, format!("1,{next}"));
+    let opened = read(&file);
+    let found: Vec<&str> = opened.document.entities().iter().map(|e| e.name.as_str()).collect();
+    assert_eq!(found, ["wing / Surface 0", "wing / rib / Surface 1", "wing / rib / Surface 2", "Surface 3"]);
+    let says = |severity: Severity, part: &str| {
+        opened.report.lines.iter().any(|l| l.severity == severity && l.reason.contains(part))
+    };
+    assert!(says(Severity::Info, "begin with `wing`") && says(Severity::Info, "without a name"));
+    assert!(says(Severity::Warning, "1 of its 2 members do not exist"), "{:?}", opened.report.lines);
+}

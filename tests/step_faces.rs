@@ -2,126 +2,18 @@
 
 #![allow(clippy::unwrap_used, reason = "a test helper may stop the test")]
 
+#[path = "support/step_text.rs"]
+mod step_text;
+
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use patchwright::io::{Opened, Severity, step};
+use patchwright::io::{Opened, Severity};
 use patchwright::kernel::geom::trim::SurfaceKind;
 use patchwright::kernel::job::Job;
 use patchwright::kernel::mesh::area::area;
 use patchwright::model::document::Unit;
 use patchwright::model::topology::{Meets, edges};
-
-/// A STEP file, statement by statement.
-#[derive(Default)]
-struct File {
-    lines: Vec<String>,
-    bound_sense: bool,
-}
-
-impl File {
-    fn add(&mut self, text: impl AsRef<str>) -> usize {
-        let number = self.lines.len() + 1;
-        self.lines.push(format!("#{number}={};", text.as_ref()));
-        number
-    }
-
-    fn point(&mut self, p: [f64; 3]) -> usize {
-        self.add(format!("CARTESIAN_POINT('',({:?},{:?},{:?}))", p[0], p[1], p[2]))
-    }
-
-    fn direction(&mut self, p: [f64; 3]) -> usize {
-        self.add(format!("DIRECTION('',({:?},{:?},{:?}))", p[0], p[1], p[2]))
-    }
-
-    fn frame(&mut self, origin: [f64; 3], z: [f64; 3], x: [f64; 3]) -> usize {
-        let (o, z, x) = (self.point(origin), self.direction(z), self.direction(x));
-        self.add(format!("AXIS2_PLACEMENT_3D('',#{o},#{z},#{x})"))
-    }
-
-    fn vertex(&mut self, p: [f64; 3]) -> usize {
-        let p = self.point(p);
-        self.add(format!("VERTEX_POINT('',#{p})"))
-    }
-
-    fn line(&mut self, a: [f64; 3], b: [f64; 3]) -> usize {
-        let d = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
-        let (p, d) = (self.point(a), self.direction(d));
-        let v = self.add(format!("VECTOR('',#{d},1.)"));
-        self.add(format!("LINE('',#{p},#{v})"))
-    }
-
-    fn circle(&mut self, origin: [f64; 3], z: [f64; 3], x: [f64; 3], r: f64) -> usize {
-        let f = self.frame(origin, z, x);
-        self.add(format!("CIRCLE('',#{f},{r:?})"))
-    }
-
-    fn edge(&mut self, from: usize, to: usize, curve: usize) -> usize {
-        self.add(format!("EDGE_CURVE('',#{from},#{to},#{curve},.T.)"))
-    }
-
-    /// A bound of edges with their senses.
-    fn bound(&mut self, uses: &[(usize, bool)]) -> usize {
-        // Some files run a loop backwards and say so at the bound.
-        let turned = self.bound_sense;
-        let mut uses: Vec<(usize, bool)> = uses.iter().map(|&(e, s)| (e, s != turned)).collect();
-        if turned {
-            uses.reverse();
-        }
-        let list: Vec<String> = uses
-            .iter()
-            .map(|(e, s)| {
-                format!("#{}", self.add(format!("ORIENTED_EDGE('',*,*,#{e},.{}.)", if *s { 'T' } else { 'F' })))
-            })
-            .collect();
-        let ring = self.add(format!("EDGE_LOOP('',({}))", list.join(",")));
-        self.add(format!("FACE_OUTER_BOUND('',#{ring},.{}.)", if turned { 'F' } else { 'T' }))
-    }
-
-    fn face(&mut self, surface: usize, bounds: &[usize], sense: bool) -> usize {
-        let list: Vec<String> = bounds.iter().map(|b| format!("#{b}")).collect();
-        self.add(format!("ADVANCED_FACE('',({}),#{surface},.{}.)", list.join(","), if sense { 'T' } else { 'F' }))
-    }
-
-    /// A context in millimetres and degrees.
-    fn context(&mut self) -> usize {
-        let mm = self.add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))");
-        let radian = self.add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))");
-        let measure =
-            self.add(format!("PLANE_ANGLE_MEASURE_WITH_UNIT(PLANE_ANGLE_MEASURE(0.017453292519943295),#{radian})"));
-        let degree = self.add(format!("(CONVERSION_BASED_UNIT('DEGREE',#{measure})NAMED_UNIT(*)PLANE_ANGLE_UNIT())"));
-        self.add(format!(
-            "(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNIT_ASSIGNED_CONTEXT((#{mm},#{degree}))REPRESENTATION_CONTEXT('',''))"
-        ))
-    }
-
-    fn shell(&mut self, faces: &[usize]) -> usize {
-        let list: Vec<String> = faces.iter().map(|f| format!("#{f}")).collect();
-        self.add(format!("CLOSED_SHELL('',({}))", list.join(",")))
-    }
-
-    /// A representation of these items.
-    fn shape(&mut self, items: &[usize]) -> usize {
-        let context = self.context();
-        let list: Vec<String> = items.iter().map(|f| format!("#{f}")).collect();
-        self.add(format!("ADVANCED_BREP_SHAPE_REPRESENTATION('',({}),#{context})", list.join(",")))
-    }
-
-    fn read(&self) -> Opened {
-        let text = format!(
-            "ISO-10303-21;\nHEADER;\nFILE_DESCRIPTION((''),'2;1');\nENDSEC;\nDATA;\n{}\nENDSEC;\nEND-ISO-10303-21;\n",
-            self.lines.join("\n")
-        );
-        let opened = step::open(text.as_bytes());
-        for line in &opened.report.lines {
-            println!("{line}");
-        }
-        opened
-    }
-}
-
-const X: [f64; 3] = [1.0, 0.0, 0.0];
-const Z: [f64; 3] = [0.0, 0.0, 1.0];
-const O: [f64; 3] = [0.0; 3];
+use step_text::{File, O, X, Z, frustum};
 
 fn areas(opened: &Opened) -> Vec<f64> {
     opened.document.sheets().map(|(_, s)| area(&s)).collect()
@@ -129,25 +21,6 @@ fn areas(opened: &Opened) -> Vec<f64> {
 
 fn agree(found: &[f64], exact: &[f64]) -> bool {
     found.len() == exact.len() && found.iter().zip(exact).all(|(a, b)| (a - b).abs() <= 2e-4 * b)
-}
-
-/// A frustum (radius 1 below, 2 above, height 1) with a seam, and its two caps.
-fn frustum(file: &mut File) -> Vec<usize> {
-    let (low, high) = (file.vertex(X), file.vertex([2.0, 0.0, 1.0]));
-    let (c0, c1) = (file.circle(O, Z, X, 1.0), file.circle(Z, Z, X, 2.0));
-    let l = file.line(X, [2.0, 0.0, 1.0]);
-    let (e0, e1, seam) = (file.edge(low, low, c0), file.edge(high, high, c1), file.edge(low, high, l));
-    let f = file.frame(O, Z, X);
-    let cone = file.add(format!("CONICAL_SURFACE('',#{f},1.,45.)"));
-    let side = file.bound(&[(e0, true), (seam, true), (e1, false), (seam, false)]);
-    let side = file.face(cone, &[side], true);
-    let bottom = file.add(format!("PLANE('',#{f})"));
-    let below = file.bound(&[(e0, false)]);
-    let below = file.face(bottom, &[below], false);
-    let g = file.frame(Z, Z, X);
-    let top = file.add(format!("PLANE('',#{g})"));
-    let above = file.bound(&[(e1, true)]);
-    vec![side, below, file.face(top, &[above], true)]
 }
 
 #[test]

@@ -117,6 +117,75 @@ pub fn square(z: f64) -> String {
     bilinear([[0.0, 0.0, z], [1.0, 0.0, z], [0.0, 1.0, z], [1.0, 1.0, z]])
 }
 
+/// A file with every kind of entity that the reader knows.
+pub fn one_of_each() -> File {
+    let mut file = File::default();
+    let name = file.add_entity(Entity { kind: 406, form: 15, parameters: "1,4Hname".into(), ..Entity::default() });
+    let color = file.add(314, "10.,20.,30.") as i64;
+    let map = file.add(124, "1.,0.,0.,1.,0.,1.,0.,2.,0.,0.,1.,3.");
+    let parameters = format!("{},0,1,{name}", square(1.0));
+    let s = file.add_entity(Entity { kind: 128, transform: map, color: -color, parameters, ..Entity::default() });
+    let line = file.add(110, "0.,0.,0.,1.,0.,0.");
+    let arc = file.add(100, "0.,0.,0.,1.,0.,0.,1.");
+    let chain = file.add(102, format!("2,{line},{arc}"));
+    let on = file.add(142, format!("0,{s},{chain},{chain},3"));
+    file.add(144, format!("{s},1,1,{on},{on}"));
+    let boundary = file.add(141, format!("0,3,{s},1,{line},1,1,{arc}"));
+    file.add(143, format!("0,{s},1,{boundary}"));
+    file.add(126, "2,2,0,0,1,0,0.,0.,0.,1.,1.,1.,1.,.5,1.,0.,0.,0.,1.,0.,0.,1.,1.,0.,0.,1.");
+    let row = |n: usize| vec!["0.5"; n].join(",");
+    file.add(112, format!("3,2,3,1,0.,1.,{}", row(24)));
+    file.add(114, format!("3,1,1,1,0.,1.,0.,1.,{}", row(192)));
+    file.add(120, format!("{line},{arc},0.,1."));
+    file.add(122, format!("{arc},0.,0.,1."));
+    file.add(502, "1,0.,0.,0.");
+    let edges = file.add(504, format!("1,{line},1,1,1,1"));
+    let ring = file.add(508, format!("1,0,{edges},1,1,1,0,{arc}"));
+    let face = file.add(510, format!("{s},1,1,{ring}"));
+    let shell = file.add(514, format!("1,{face},1"));
+    file.add(186, format!("{shell},1,0"));
+    file.add(402, format!("2,{line},{arc}"));
+    // A real outline, a plane, quadrics, ruled and offset surfaces, conics, polylines, a subfigure.
+    let outline: Vec<String> = [[0.1, 0.1], [0.9, 0.1], [0.9, 0.9], [0.1, 0.1]]
+        .windows(2)
+        .map(|p| file.add(110, format!("{:?},{:?},1.,{:?},{:?},1.", p[0][0], p[0][1], p[1][0], p[1][1])).to_string())
+        .collect();
+    let outline = file.add(102, format!("3,{}", outline.join(",")));
+    let point = file.add(116, "0.,0.,1.,0");
+    let axis = file.add(123, "0.,0.,1.");
+    let plane = file.add(190, format!("{point},{axis}"));
+    let on = file.add(142, format!("0,{plane},0,{outline},2"));
+    let trimmed = file.add(144, format!("{plane},1,0,{on}"));
+    let drum = file.add(192, format!("{point},{axis},2."));
+    let rims = [0.0, 1.0].map(|z| file.add(100, format!("{z:?},0.,0.,2.,0.,2.,0.")));
+    let rims = rims.map(|c| file.add(142, format!("0,{drum},0,{c},2")));
+    file.add(144, format!("{drum},1,1,{},{}", rims[0], rims[1]));
+    file.add(196, format!("{point},2."));
+    file.add(198, format!("{point},{axis},3.,1."));
+    let ruled = file.add(118, format!("{line},{arc},0,0"));
+    file.add(140, format!("0.,0.,1.,.5,{ruled}"));
+    file.add_entity(Entity {
+        kind: 104,
+        form: 1,
+        parameters: "1.,0.,4.,0.,0.,-4.,0.,2.,0.,0.,1.".into(),
+        ..Entity::default()
+    });
+    file.add_entity(Entity { kind: 106, form: 12, parameters: "2,2,0.,0.,0.,1.,1.,1.".into(), ..Entity::default() });
+    let subfigure = file.add(308, format!("0,1Hs,1,{trimmed}"));
+    for place in ["0.,0.,9.,1.", "0.,0.,9.,2."] {
+        file.add(408, format!("{subfigure},{place}"));
+    }
+    file.add(110, "5.,0.,0.,1.,0.,0.");
+    file.add(130, format!("{line},2,0,0,1,.1,0.,.3,1.,0.,0.,1.,0.,1."));
+    file.add_entity(Entity {
+        kind: 402,
+        form: 7,
+        parameters: format!("2,{s},{trimmed},0,1,{name}"),
+        ..Entity::default()
+    });
+    file
+}
+
 /// Where the shared test data is, if it is.
 pub fn shared_data() -> Option<std::path::PathBuf> {
     let folder = std::path::PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data"));
