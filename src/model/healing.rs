@@ -175,3 +175,90 @@ fn as_it_was(patch: &Patch, joining_tol: f64) -> PatchSpec {
     spec.joining.tol = spec.joining.tol.or(patch.settings.joining_tol.filter(|tol| *tol != joining_tol));
     spec
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use glam::DVec3;
+
+    use super::*;
+    use crate::kernel::geom::ring::{EdgeInput, RingOptions, face};
+    use crate::kernel::geom::trim::SurfaceKind;
+    use crate::kernel::geom::{Curve, Knots, Surface, sweep};
+    use crate::kernel::heal::deviation::count;
+    use crate::model::document::{Shape, Unit};
+    use crate::model::spec::Piece;
+
+    /// Half the side of the patch.
+    const HALF: f64 = 1.0;
+    const HOLE: f64 = 0.6;
+
+    /// A plane with a bump in its middle, which is all inside the hole of the face on it.
+    fn bumpy() -> Surface {
+        let n = 24;
+        let knots =
+            Knots::clamped(3, &(0..=n).map(|k| -1.5 + 3.0 * f64::from(k) / f64::from(n)).collect::<Vec<_>>(), 1)
+                .unwrap();
+        let at = knots.greville();
+        let points = at
+            .iter()
+            .flat_map(|&y| at.iter().map(move |&x| DVec3::new(x, y, if x.hypot(y) < 0.25 { 0.2 } else { 0.0 })))
+            .collect();
+        Surface::new(knots.clone(), knots, points, None).unwrap()
+    }
+
+    fn document(holed: bool) -> Document {
+        let surface = Arc::new(bumpy());
+        let mut document = Document::new(Unit::Metre);
+        if !holed {
+            document.add("whole", Shape::Surface(surface), None);
+            return document;
+        }
+        let c = [[-1.5, -1.5], [1.5, -1.5], [1.5, 1.5], [-1.5, 1.5]].map(|[x, y]| DVec3::new(x, y, 0.0));
+        let edge = |id, curve| EdgeInput { id, curve: Some(Arc::new(curve)), guide: None, reversed: false };
+        let outer = (0..4).map(|k| edge(k as u64, Curve::segment(c[k], c[(k + 1) % 4]).unwrap())).collect();
+        let hole = vec![edge(9, sweep::arc(DVec3::ZERO, DVec3::X * HOLE, DVec3::Y * HOLE, 0.0, TAU).unwrap())];
+        let made = face(&surface, SurfaceKind::Spline, &[outer, hole], &RingOptions::default()).unwrap();
+        document.add("holed", Shape::Face(Arc::new(made.face)), None);
+        document
+    }
+
+    fn healed(holed: bool) -> Healing {
+        let corners = [(-HALF, -HALF, 0.0), (HALF, -HALF, 0.0), (HALF, HALF, 0.0), (-HALF, HALF, 0.0)];
+        let sides = std::array::from_fn(|k| vec![Piece::Line(corners[k], corners[(k + 1) % 4])]);
+        let patch = PatchSpec { name: "over the hole".into(), sides, ..PatchSpec::default() };
+        let spec = HealSpec {
+            min_resolution: 32,
+            max_resolution: 32,
+            slab: Some(0.5),
+            patches: vec![patch],
+            ..HealSpec::default()
+        };
+        run(&document(holed), &spec, &Job::new()).unwrap()
+    }
+
+    fn highest(healing: &Healing) -> f64 {
+        let surface = &healing.healed.patches[0].surface;
+        let at = |k: usize| glam::DVec2::new((k % 41) as f64 / 40.0, (k / 41) as f64 / 40.0);
+        (0..41 * 41).map(|k| surface.eval(at(k)).z.abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_hole_of_a_face_is_no_ground_to_project_on() {
+        // On the whole surface the patch follows the bump; over the hole it is filled from what is around.
+        let whole = healed(false);
+        assert!(highest(&whole) > 0.1, "{}", highest(&whole));
+        let holed = healed(true);
+        assert!(highest(&holed) < 1e-6, "{}", highest(&holed));
+        let samples = &holed.healed.patches[0].samples;
+        for sample in samples.values().iter().filter(|s| s.status.is_projected()) {
+            assert!(sample.point.truncate().length() > HOLE - 2e-3, "{}", sample.point);
+        }
+        // The samples over the hole are artificial: its area is that share of the patch.
+        let share = count(samples)[2] as f64 / samples.values().len() as f64;
+        let exact = 0.5 * TAU * HOLE * HOLE / (4.0 * HALF * HALF);
+        assert!((share / exact - 1.0).abs() < 0.15, "{share} {exact}");
+        assert_eq!(count(&whole.healed.patches[0].samples)[2], 0);
+    }
+}

@@ -169,7 +169,7 @@ mod tests {
     use super::*;
     use crate::kernel::geom::ring::{EdgeInput, RingOptions, face};
     use crate::kernel::geom::trim::SurfaceKind;
-    use crate::kernel::geom::{Surface, sweep};
+    use crate::kernel::geom::{Curve, Surface, sweep};
     use crate::kernel::job::Job;
 
     fn plane(corners: [DVec3; 4]) -> Arc<Surface> {
@@ -201,5 +201,79 @@ mod tests {
             assert!((r - 1.0).abs() < 1e-4 || (r - 0.5).abs() < 1e-4, "{ends:?}");
         }
         assert!(found.curves.iter().all(|c| c.ends == [CurveEnd::Boundary; 2]));
+    }
+
+    /// The plane z = 0 over [-3, 3]^2 without the unit disk.
+    fn holed() -> Arc<Face> {
+        let p = |x: f64, y: f64| DVec3::new(x, y, 0.0);
+        let flat = plane([p(-3.0, -3.0), p(3.0, -3.0), p(-3.0, 3.0), p(3.0, 3.0)]);
+        let corners = [p(-3.0, -3.0), p(3.0, -3.0), p(3.0, 3.0), p(-3.0, 3.0)];
+        let edge = |id, curve| EdgeInput { id, curve: Some(Arc::new(curve)), guide: None, reversed: false };
+        let outer = (0..4).map(|k| edge(k as u64, Curve::segment(corners[k], corners[(k + 1) % 4]).unwrap())).collect();
+        let hole = vec![edge(9, sweep::arc(DVec3::ZERO, DVec3::X, DVec3::Y, 0.0, TAU).unwrap())];
+        Arc::new(face(&flat, SurfaceKind::Plane, &[outer, hole], &RingOptions::default()).unwrap().face)
+    }
+
+    /// What a plane with a hole has in common with an upright cylinder, trimmed at z >= `above` where that is given.
+    fn cut_by_cylinder(x: f64, radius: f64, above: Option<f64>) -> Intersection {
+        let plane = holed();
+        let foot = DVec3::new(x, 0.0, -1.0);
+        let arc = sweep::arc(foot, DVec3::X * radius, DVec3::Y * radius, 0.0, TAU).unwrap();
+        let cylinder = Arc::new(sweep::extruded(&arc, DVec3::Z * 2.0).unwrap());
+        let ring = |z: f64| {
+            let center = DVec3::new(x, 0.0, z);
+            let curve = sweep::arc(center, DVec3::X * radius, DVec3::Y * radius, 0.0, TAU).unwrap();
+            vec![EdgeInput { id: 20 + (10.0 * z) as u64, curve: Some(Arc::new(curve)), guide: None, reversed: false }]
+        };
+        let upper = above.map(|z| {
+            let rings = [ring(z), ring(1.0)];
+            Arc::new(face(&cylinder, SurfaceKind::Cylinder, &rings, &RingOptions::default()).unwrap().face)
+        });
+        let surfaces = [plane.surface(), upper.as_ref().map_or(&cylinder, |f| f.surface())].map(Arc::clone);
+        let options = SsiOptions::default();
+        let mut found = intersect(&[(0, &*surfaces[0])], &[(1, &*surfaces[1])], &options, &Job::new()).unwrap();
+        clip(&mut found, &|n| if n == 0 { Some(Arc::clone(&plane)) } else { upper.clone() });
+        assert!(found.complete, "{:?}", found.unresolved);
+        found
+    }
+
+    fn length(curve: &IntersectionCurve) -> f64 {
+        curve.points.windows(2).map(|w| w[0].xyz.distance(w[1].xyz)).sum()
+    }
+
+    #[test]
+    fn a_cylinder_through_the_rim_of_a_hole_leaves_the_arc_outside_of_it() {
+        // Circles of radius 1 about 0 and of radius 3/2 about x = 1 meet where x = (1 + 1 - 9/4) / 2 = -1/8.
+        let found = cut_by_cylinder(1.0, 1.5, None);
+        assert_eq!(found.curves.len(), 1, "one arc, whichever place the cylinder's seam has on it");
+        let arc = &found.curves[0];
+        assert!(!arc.closed && arc.ends == [CurveEnd::Boundary; 2]);
+        let mut ys: Vec<f64> = Vec::new();
+        for p in [arc.points[0].xyz, arc.points[arc.points.len() - 1].xyz] {
+            assert!((p.x + 0.125).abs() < 1e-4 && (p.truncate().length() - 1.0).abs() < 1e-4, "{p}");
+            ys.push(p.y);
+        }
+        assert!(ys[0] * ys[1] < 0.0);
+        let exact = 1.5 * (TAU - 2.0 * 0.75f64.acos());
+        assert!((length(arc) / exact - 1.0).abs() < 1e-3, "{} {exact}", length(arc));
+        assert!(arc.points.iter().all(|p| p.xyz.truncate().length() > 1.0 - 1e-4));
+    }
+
+    #[test]
+    fn a_cylinder_inside_the_hole_meets_nothing_and_one_around_it_everything() {
+        assert!(cut_by_cylinder(0.0, 0.5, None).curves.is_empty());
+        let around = cut_by_cylinder(0.0, 2.0, None);
+        assert!(around.curves.len() == 1 && around.curves[0].closed);
+        assert!((length(&around.curves[0]) / (2.0 * TAU) - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn both_faces_count() {
+        // The part of the cylinder that is there ends above the plane, then below it.
+        assert!(cut_by_cylinder(1.0, 1.5, Some(0.25)).curves.is_empty());
+        let found = cut_by_cylinder(1.0, 1.5, Some(-0.25));
+        let exact = 1.5 * (TAU - 2.0 * 0.75f64.acos());
+        let total: f64 = found.curves.iter().map(length).sum();
+        assert!((total / exact - 1.0).abs() < 1e-3, "{total} {exact}");
     }
 }
