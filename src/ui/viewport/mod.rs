@@ -271,7 +271,10 @@ impl Viewport {
             return;
         }
         wanted.truncate(BATCH);
-        let name = format!("Draw {} entities", wanted.len());
+        let name = match wanted.len() {
+            1 => "Draw 1 entity".to_owned(),
+            n => format!("Draw {n} entities"),
+        };
         self.making = Some(jobs.spawn(Lane::Preview, name, "", move |_| {
             use rayon::prelude::*;
             wanted.into_par_iter().map(Request::run).collect()

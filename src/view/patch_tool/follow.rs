@@ -156,7 +156,7 @@ impl PatchTool {
                 }
                 let n = curve.points.len() - 1;
                 let at = if near(ends[0]) { curve.t[0] } else { curve.t[n] };
-                let stretch = self.edges.at(&curve.curve, at).map(|e| e.range);
+                let stretch = self.stretch_at(&curve.curve, at, scene);
                 let Ok(piece) = Picked::of_curve(scene, curve.curve, stretch, at) else { continue };
                 let least = joint_angles(line, &piece, tol).into_iter().map(|(_, a)| a).fold(f64::INFINITY, f64::min);
                 if least <= CHAINS {

@@ -9,6 +9,7 @@ use super::{Mode, PatchTool, SidePick, Stage, sentence};
 use crate::kernel::geom::Direction;
 use crate::model::document::{EntityId, Shape};
 use crate::view::display::CurveRef;
+use crate::view::feature_edges::EdgePiece;
 use crate::view::navigation::Modifiers;
 use crate::view::pick::{PickHit, Target};
 use crate::view::scene::{ItemKind, Scene};
@@ -16,6 +17,8 @@ use crate::view::snap::Snap;
 
 /// A curve carries on a side when it turns by less than this at the joint, in degrees.
 const CARRIES_ON: f64 = 30.0;
+/// A border that passes through a surface is near it for at most this many joining tolerances.
+const PASSING: f64 = 8.0;
 
 impl PatchTool {
     pub(super) fn click(&mut self, hit: Option<PickHit>, snap: Option<Snap>, held: Modifiers, scene: &Scene) {
@@ -59,6 +62,37 @@ impl PatchTool {
         }
     }
 
+    /// The stretch of a border that is of one kind around a parameter. A short stretch of another kind does not end it
+    /// when what follows is of the same kind again: there the border only passes through another surface.
+    pub(super) fn stretch_at(&self, curve: &CurveRef, t: f64, scene: &Scene) -> Option<[f64; 2]> {
+        let mut pieces: Vec<&EdgePiece> = self.edges.pieces.iter().filter(|p| p.curve == *curve).collect();
+        pieces.sort_by(|a, b| a.range[0].total_cmp(&b.range[0]));
+        let own = pieces.iter().position(|p| p.range[0] <= t && t <= p.range[1])?;
+        let geometry = &scene.curve_item(curve)?.geometry;
+        let is_short = |p: &EdgePiece| {
+            let at = |k: u32| {
+                let t = p.range[0] + (p.range[1] - p.range[0]) * f64::from(k) / 8.0;
+                geometry.curve_jet(curve, t).map_or(DVec3::NAN, |jet| jet[0])
+            };
+            (1..=8).map(|k| at(k).distance(at(k - 1))).sum::<f64>() <= PASSING * self.options.joining_tol
+        };
+        let is_same = |p: &EdgePiece| p.kind == pieces[own].kind && p.neighbours == pieces[own].neighbours;
+        // As far as pieces of the same kind go with only short ones between them.
+        let reach = |rest: &mut dyn Iterator<Item = usize>| {
+            let mut last = own;
+            for k in rest {
+                if is_same(pieces[k]) {
+                    last = k;
+                } else if !is_short(pieces[k]) {
+                    break;
+                }
+            }
+            last
+        };
+        let (first, last) = (reach(&mut (0..own).rev()), reach(&mut (own + 1..pieces.len())));
+        Some([pieces[first].range[0], pieces[last].range[1]])
+    }
+
     pub(super) fn click_surface(&mut self, entity: EntityId, uv: DVec2, scene: &Scene) {
         if scene.item(entity).is_some_and(|item| item.kind == ItemKind::Patch) {
             self.refuse("A healed patch has no iso-curves to pick; click one of its sides to share it");
@@ -66,7 +100,7 @@ impl PatchTool {
         }
         if scene.item(entity).is_some_and(|item| item.kind == ItemKind::Mesh) {
             self.refuse(
-                "A mesh has no iso-curves; click one of its borders, feature edges or grid lines, or draw with D",
+                "A mesh has no iso-curves; click one of its borders, feature edges or grid lines, or draw with W",
             );
             return;
         }
@@ -112,7 +146,7 @@ impl PatchTool {
         }
         let domain = scene.curve_item(&curve).and_then(|item| item.geometry.curve_domain(&curve));
         // A border that is only in part free (or open, or shared) is taken in that part.
-        let stretch = self.edges.at(&curve, t).map_or([f64::NEG_INFINITY, f64::INFINITY], |piece| piece.range);
+        let stretch = self.stretch_at(&curve, t, scene).unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
         let range = domain.map(|[a, b]| [a.max(free[0]).max(stretch[0]), b.min(free[1]).min(stretch[1])]);
         match Picked::of_curve(scene, curve, range, t) {
             Ok(piece) if held.shift => match piece.split(scene, point) {
@@ -308,4 +342,46 @@ fn side_at(scene: &Scene, patch: EntityId, point: DVec3) -> Option<SidePick> {
 fn ends_apart(line: &SideLine, piece: &Picked) -> f64 {
     let ends = piece.ends();
     line.ends().iter().flat_map(|a| ends.map(|b| a.distance(b))).fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::super::testing::scene_of;
+    use super::*;
+    use crate::kernel::geom::{Side, Surface};
+    use crate::kernel::job::Job;
+    use crate::kernel::tol::Tolerances;
+    use crate::model::document::{Document, Unit};
+    use crate::view::feature_edges::{EdgeOptions, feature_edges};
+
+    #[test]
+    fn a_border_that_passes_through_a_wall_is_picked_whole_and_one_that_ends_being_shared_in_part() {
+        let mut document = Document::new(Unit::Millimetre);
+        let mut sheet = |o: [f64; 3], u: DVec3, v: DVec3| {
+            let o = DVec3::from_array(o);
+            let surface = Surface::bilinear([o, o + u, o + v, o + u + v]).unwrap();
+            document.add("sheet", Shape::Surface(Arc::new(surface)), None)
+        };
+        let floor = sheet([0.0, 0.0, 0.0], DVec3::X * 4.0, DVec3::Y);
+        // A wall through the border at x = 1 and 30 degrees, and a floor that goes on for x > 3.
+        let along = DVec3::new(3.0_f64.sqrt(), 1.0, 0.0);
+        sheet([1.0 - along.x, -1.0, -1.0], along * 2.0, DVec3::Z * 2.0);
+        sheet([3.0, 0.0, 0.0], DVec3::NEG_Y, DVec3::X);
+        let scene = scene_of(&document);
+        let tol = 0.1;
+        let edges = feature_edges(&document, &EdgeOptions::new(tol), &Job::new());
+        let border = CurveRef::Border(floor, Side::VMin);
+        assert!(edges.pieces.iter().filter(|p| p.curve == border).count() > 2, "the wall cuts the border: {edges:?}");
+        let mut tool = PatchTool::new(&Tolerances::of(&document.bounds()), Unit::Millimetre);
+        tool.options.joining_tol = tol;
+        tool.set_edges(Arc::new(edges));
+        for t in [0.1, 0.5] {
+            let [from, to] = tool.stretch_at(&border, t, &scene).unwrap();
+            assert!(from == 0.0 && (to - 0.75).abs() < 0.03, "{from} {to}");
+        }
+        let [from, to] = tool.stretch_at(&border, 0.9, &scene).unwrap();
+        assert!((from - 0.75).abs() < 0.03 && to == 1.0, "{from} {to}");
+    }
 }
