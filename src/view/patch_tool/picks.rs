@@ -62,8 +62,8 @@ impl PatchTool {
         }
     }
 
-    /// The stretch of a border that is of one kind around a parameter. A short stretch of another kind does not end it
-    /// when what follows is of the same kind again: there the border only passes through another surface.
+    /// The stretch of a border that is of one kind around a parameter. Short stretches of other kinds do not end it:
+    /// there the border only passes through another surface, and that is where it will be cut.
     pub(super) fn stretch_at(&self, curve: &CurveRef, t: f64, scene: &Scene) -> Option<[f64; 2]> {
         let mut pieces: Vec<&EdgePiece> = self.edges.pieces.iter().filter(|p| p.curve == *curve).collect();
         pieces.sort_by(|a, b| a.range[0].total_cmp(&b.range[0]));
@@ -77,17 +77,8 @@ impl PatchTool {
             (1..=8).map(|k| at(k).distance(at(k - 1))).sum::<f64>() <= PASSING * self.options.joining_tol
         };
         let is_same = |p: &EdgePiece| p.kind == pieces[own].kind && p.neighbours == pieces[own].neighbours;
-        // As far as pieces of the same kind go with only short ones between them.
         let reach = |rest: &mut dyn Iterator<Item = usize>| {
-            let mut last = own;
-            for k in rest {
-                if is_same(pieces[k]) {
-                    last = k;
-                } else if !is_short(pieces[k]) {
-                    break;
-                }
-            }
-            last
+            rest.take_while(|&k| is_same(pieces[k]) || is_short(pieces[k])).last().unwrap_or(own)
         };
         let (first, last) = (reach(&mut (0..own).rev()), reach(&mut (own + 1..pieces.len())));
         Some([pieces[first].range[0], pieces[last].range[1]])
