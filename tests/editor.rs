@@ -596,3 +596,52 @@ fn measuring_two_borders_gives_the_gap_that_dense_sampling_gives() {
     key(&mut window, Modifiers::NONE, Key::Escape);
     assert!(prompt(&window).starts_with("Select"), "{}", prompt(&window));
 }
+
+/// Clicks the eye beside an entity.
+fn toggle_eye(window: &mut Window, label: &str) {
+    window.get_by_label(label).click();
+    settle(window);
+}
+
+#[test]
+fn a_leaf_of_a_real_model_is_healed_up_to_the_stem_it_runs_into() {
+    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/models/pocc_surf114.igs");
+    if !model.exists() {
+        println!("skipped: no shared data");
+        return;
+    }
+    let mut window = window(builder(), Options { files: vec![model], ..Options::default() });
+    // Where the leaf enters the stem, kept as a curve. The stem's seam is crossed on the way.
+    for label in ["Hide Surface 2", "Hide Surface 3"] {
+        toggle_eye(&mut window, label);
+    }
+    key(&mut window, Modifiers::COMMAND | Modifiers::SHIFT, Key::X);
+    key(&mut window, Modifiers::NONE, Key::K);
+    assert_eq!(window.state().editor.document().curves().count(), 1);
+    key(&mut window, Modifiers::NONE, Key::Escape);
+    key(&mut window, Modifiers::NONE, Key::Escape);
+    toggle_eye(&mut window, "Hide Surface 1");
+    // From nearby: the whole leaf is thirty times larger than the curve.
+    let name = "intersection 1 of Surface 0 and Surface 1";
+    let (id, _) = window.state().editor.document().curves().next().unwrap();
+    window.state_mut().editor.selection.set([id]);
+    key(&mut window, Modifiers::NONE, Key::F);
+    key(&mut window, Modifiers::NONE, Key::P);
+    pick(&mut window, name, "curve");
+    key(&mut window, Modifiers::NONE, Key::Enter);
+    key(&mut window, Modifiers::NONE, Key::Home);
+    for curve in ["border v min", "iso u 5.00", "border v max"] {
+        pick(&mut window, "Surface 0", curve);
+        key(&mut window, Modifiers::NONE, Key::Enter);
+    }
+    picture(&mut window, "editor_leaf_picked");
+    // The borders were clicked beyond the iso-curve; the only loop that closes is the one by the stem.
+    key(&mut window, Modifiers::NONE, Key::C);
+    assert!(prompt(&window).starts_with("Patch · Four sides"), "{}", prompt(&window));
+    key(&mut window, Modifiers::NONE, Key::Enter);
+    picture(&mut window, "editor_leaf_healed");
+    let Tool::Patch(session) = &window.state().editor.tool else { panic!() };
+    let report = session.tool.result().map(|p| p.report.clone()).unwrap_or_else(|| panic!("{}", prompt(&window)));
+    println!("leaf: {:.2e} on {} samples, {} artificial", report.max_error, report.projected, report.artificial);
+    assert!(report.reached && report.artificial == 0, "{report:?}");
+}
