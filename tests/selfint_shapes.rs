@@ -12,7 +12,7 @@ use glam::{DVec2, DVec3};
 use patchwright::kernel::geom::{Direction, Knots, Surface};
 use patchwright::kernel::job::Job;
 use patchwright::kernel::self_ssi::{SelfIntersectOptions, SelfIntersection, self_intersect};
-use patchwright::kernel::ssi::result::{CurveEnd, CurveKind, IntersectionCurve};
+use patchwright::kernel::ssi::result::{CurveEnd, CurveKind, IntersectionCurve, JunctionKind};
 use shapes::{interpolate, ridge, sextic, spans, spun, square, turned};
 
 fn solve(name: &str, surface: &Surface) -> SelfIntersection {
@@ -429,6 +429,117 @@ fn degenerate_miter_points_are_isolated_or_have_their_branches() {
             }
         }
     }
+}
+
+/// The curve (t^3 - t, (t^2 - 1)^2 (t + 2)), |t| <= 1.1, meets itself in 0 only, for t = -1 and 1, with the tangent x and the
+/// curvatures 6 and 2 there. `lift(t, v)` is added to the height.
+fn touching(lift: impl Fn(f64, f64) -> f64) -> Surface {
+    let (ku, kv) = (Knots::bezier(5, -1.1, 1.1).unwrap(), Knots::bezier(2, -1.0, 1.0).unwrap());
+    interpolate(&ku, &kv, |t, v| {
+        let height = (t * t - 1.0).powi(2) * (t + 2.0) + lift(t, v);
+        turned(DVec3::new(t.powi(3) - t, v, height))
+    })
+}
+
+#[test]
+fn sheets_that_touch_in_a_point_are_one_isolated_contact() {
+    // The heights differ by 2 x^2 + v^2 to leading order: definite.
+    let found = solve("touching in a point", &touching(|t, v| 0.5 * t * v * v));
+    let r = &found.result;
+    assert!(r.complete && r.curves.is_empty() && r.miters.is_empty() && r.regions.is_empty(), "{:?}", r.unresolved);
+    assert_eq!(r.junctions.len(), 1);
+    let j = &r.junctions[0];
+    assert!(j.kind == JunctionKind::Isolated && j.gap.abs() < 1e-9 && j.xyz.distance(turned(DVec3::ZERO)) < 1e-7);
+    let ends = [j.uv, j.st].map(|p| p.distance(DVec2::X).min(p.distance(-DVec2::X)));
+    assert!(ends[0] < 1e-6 && ends[1] < 1e-6 && (j.uv.x + j.st.x).abs() < 1e-6, "{} {}", j.uv, j.st);
+}
+
+#[test]
+fn sheets_that_touch_along_a_line_are_one_tangential_curve() {
+    let found = solve("touching along a line", &touching(|_, _| 0.0));
+    let r = &found.result;
+    assert!(r.complete && r.junctions.is_empty() && r.miters.is_empty(), "{:?}", r.unresolved);
+    assert_eq!(r.curves.len(), 1);
+    assert!(r.curves[0].kind == CurveKind::Tangential && r.curves[0].ends == [CurveEnd::Boundary; 2]);
+    for p in &r.curves[0].points {
+        assert!((p.uv.x.abs() - 1.0).abs() < 1e-5 && (p.uv.x + p.st.x).abs() < 1e-5 && (p.uv.y - p.st.y).abs() < 1e-5);
+    }
+    let vs = r.curves[0].points.iter().map(|p| p.uv.y);
+    let (low, high) = vs.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    assert!((low + 1.0).abs() < 1e-9 && (high - 1.0).abs() < 1e-9, "{low} {high}");
+}
+
+#[test]
+fn sheets_that_are_tangent_and_cross_are_said_to_be_open() {
+    // 2 x^2 - v^2: two branches cross in the point of contact.
+    let started = Instant::now();
+    let found = solve("tangent and crossing", &touching(|t, v| -0.5 * t * v * v));
+    let r = &found.result;
+    assert!(!r.complete && r.unresolved.iter().any(|u| u.reason.contains("tangent here and cross")), "{r:?}");
+    assert!(r.unresolved.len() < 10 && started.elapsed().as_secs_f64() < 30.0);
+}
+
+/// A projective map takes a cuspidal edge to a cuspidal edge.
+#[test]
+fn a_rational_cusp_edge_is_a_cusp_edge() {
+    let k = |d| Knots::bezier(d, -1.0, 1.0).unwrap();
+    let plain = interpolate(&k(3), &k(3), |u, v| {
+        let p = DVec2::from_angle(0.3).rotate(DVec2::new(u, v));
+        DVec3::new(p.x * p.x, p.x.powi(3), p.y)
+    });
+    let weight = |p: DVec3| 1.0 + 0.1 * p.x - 0.05 * p.y + 0.12 * p.z;
+    let weights: Vec<f64> = plain.points().iter().map(|&p| weight(p)).collect();
+    let points = plain.points().iter().map(|&p| turned(p / weight(p))).collect();
+    let [u, v] = plain.knots().clone();
+    let found = solve("rational cusp", &Surface::new(u, v, points, Some(weights)).unwrap());
+    assert!(found.result.complete && found.result.miters.is_empty() && found.result.regions.is_empty());
+    let edges = &found.result.curves;
+    assert!(edges.len() == 1 && edges[0].kind == CurveKind::CuspEdge && edges[0].ends == [CurveEnd::Boundary; 2]);
+    for p in &edges[0].points {
+        // The edge is p.x = 0 in the turned domain.
+        assert!(DVec2::from_angle(0.3).rotate(p.uv).x.abs() < 1e-9, "{}", p.uv);
+    }
+}
+
+/// The kernel of the miter point is the border of the domain: one of the two preimages of the double line is there, and
+/// so is the miter point; the branch starts in it, or lies outside and leaves the point alone.
+#[test]
+fn a_miter_point_on_the_border_of_the_domain() {
+    let over = |u: [f64; 2], v: [f64; 2]| {
+        let (ku, kv) = (Knots::bezier(2, u[0], u[1]).unwrap(), Knots::bezier(2, v[0], v[1]).unwrap());
+        interpolate(&ku, &kv, |x, y| turned(DVec3::new(x, x * y, y * y)))
+    };
+    // The border crosses the double line's preimages in their middle: the branch runs along it.
+    let along = solve("border along the line", &over([0.0, 1.0], [-1.0, 1.0]));
+    assert!(along.result.complete, "{:?}", along.result.unresolved);
+    assert_eq!((curves(&along).len(), along.result.miters.len()), (1, 1));
+    assert!(curves(&along)[0].ends.contains(&CurveEnd::Miter) && !along.result.miters[0].isolated);
+    for p in &curves(&along)[0].points {
+        assert!(p.uv.x.abs() < 1e-9 && (p.uv.y + p.st.y).abs() < 1e-9);
+    }
+    // Beyond the border lies one of the two preimages: no pair of the domain coincides.
+    let alone = solve("one preimage outside", &over([-1.0, 1.0], [0.0, 1.0]));
+    assert!(alone.result.complete && curves(&alone).is_empty(), "{:?}", alone.result.unresolved);
+    assert!(alone.result.miters.len() == 1 && alone.result.miters[0].uv.length() < 1e-9);
+}
+
+#[test]
+fn a_swallowtail_is_open_at_its_tip_only_and_says_so() {
+    // Double points (-2 v^2, +-v), a cusp edge (-6 v^2, v), both through the tip 0.
+    let k = |d| Knots::bezier(d, -1.0, 1.0).unwrap();
+    let started = Instant::now();
+    let surface = interpolate(&k(2), &k(4), |u, v| {
+        turned(DVec3::new(3.0 * v.powi(4) + u * v * v, 4.0 * v.powi(3) + 2.0 * u * v, u))
+    });
+    let found = solve("swallowtail", &surface);
+    let r = &found.result;
+    assert!(!r.complete && started.elapsed().as_secs_f64() < 30.0);
+    assert!(r.unresolved.iter().any(|u| u.reason.contains("swallowtail")), "{:?}", r.unresolved);
+    for u in &r.unresolved {
+        let reach = u.uv_box.iter().chain(&u.st_box).flatten().map(|x| x.abs()).fold(0.0, f64::max);
+        assert!(reach < 0.2, "{u:?}");
+    }
+    assert_eq!(r.curves.iter().filter(|c| c.kind == CurveKind::CuspEdge).count(), 1);
 }
 
 #[test]

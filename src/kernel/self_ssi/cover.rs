@@ -11,26 +11,24 @@ use std::rc::Rc;
 
 use glam::{DVec2, DVec3};
 
-use super::cusp::{CuspEdge, CuspWindow, cusp_window};
-use super::degenerate;
+use super::coincidence::{COINCIDENCE_CELL, Coincidence, FINEST_COINCIDENCE, coincide};
+use super::cusp::CuspEdge;
 use super::hull::{Hull, Rect, range};
-use super::march::{Pace, turns};
-use super::miter::{MiterKind, MiterPoint};
+use super::march::Pace;
+use super::miter::MiterPoint;
 use super::pair_test::{Verdict, examine};
 use super::record::{FailedWindow, NodeRole, NodeState, Record, TernaryNode, unsettled};
 use super::register::Register;
 use super::sheet::Sheet;
 use super::ternary::{self, Span};
-use super::window::{cross_cap, injective};
+use super::touch::{Touch, Touches};
+use super::windows::{Key, Windows, key};
 use crate::kernel::job::Job;
 
 /// The smallest box.
 const SMALLEST: f64 = 1e-7;
 /// With more unresolved boxes than this the search gives up.
 const MANY_OPEN: usize = 1000;
-/// Coincidence is looked for in boxes between these sizes: in smaller ones being close proves nothing.
-const COINCIDENCE_CELL: f64 = 1.0 / 24.0;
-const FINEST_COINCIDENCE: f64 = 1.0 / 1024.0;
 
 /// A node of the ternary tree with its domain clipped, or a box below the grid.
 #[derive(Clone, Copy, Debug)]
@@ -40,24 +38,20 @@ struct Part {
     grid: Option<[[Span; 2]; 2]>,
 }
 
+/// Where a node stands in the tree, for the record.
+#[derive(Clone, Copy, Debug)]
+struct Visit {
+    /// The number of splits above it.
+    level: u32,
+    role: NodeRole,
+    /// Its parent's place in the record.
+    parent: Option<usize>,
+}
+
 #[derive(Clone, Copy, Debug)]
 enum Item {
-    /// With the number of splits above it and its role.
-    Alone(Part, u32, NodeRole),
+    Alone(Part, Visit),
     Pair(Part, Part),
-}
-
-/// Two cells that coincide over an area.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Coincidence {
-    pub a: Rect,
-    pub b: Rect,
-}
-
-impl Coincidence {
-    pub fn swapped(self) -> Self {
-        Self { a: self.b, b: self.a }
-    }
 }
 
 /// What the search found, beside the traces.
@@ -65,28 +59,15 @@ impl Coincidence {
 pub(crate) struct Cover {
     pub open: Vec<([Rect; 2], &'static str)>,
     pub coincident: Vec<Coincidence>,
-    /// Windows folded onto themselves along the cusp edge with this number.
-    pub folds: Vec<(usize, Rect)>,
-    /// Windows that were tested and not proved injective.
-    pub failed_windows: usize,
-    pub windows: usize,
     pub pairs: usize,
     pub leaf_pairs: usize,
     pub hulls: usize,
     pub capped: bool,
 }
 
-type Key = [u64; 4];
-
-fn key(rect: &Rect) -> Key {
-    [rect.low.x, rect.low.y, rect.high.x, rect.high.y].map(f64::to_bits)
-}
-
 /// The state of one search.
 pub(crate) struct Search<'a> {
     sheet: &'a Sheet,
-    miters: &'a [MiterPoint],
-    cusps: &'a [CuspEdge],
     pace: Pace,
     cap: usize,
     job: &'a Job,
@@ -95,9 +76,9 @@ pub(crate) struct Search<'a> {
     /// Grid lines.
     pub lines: [Vec<f64>; 2],
     hulls: HashMap<Key, Rc<Hull>>,
-    injective: HashMap<Key, bool>,
-    capped_window: HashMap<Key, bool>,
-    cusp_window: HashMap<Key, Option<CuspWindow>>,
+    pub windows: Windows<'a>,
+    /// Where sheets touch; `None`: such places stay open.
+    pub touches: Option<Touches<'a>>,
     leaves: HashSet<(Key, Key)>,
     pub register: Register<'a>,
     /// What is visited, when it is asked for.
@@ -133,16 +114,13 @@ impl<'a> Search<'a> {
         Self {
             speed,
             sheet,
-            miters,
-            cusps,
             pace,
             cap,
             job,
             lines,
             hulls: HashMap::new(),
-            injective: HashMap::new(),
-            capped_window: HashMap::new(),
-            cusp_window: HashMap::new(),
+            windows: Windows::new(sheet, miters, cusps),
+            touches: None,
             leaves: HashSet::new(),
             register: Register::new(sheet),
             record: None,
@@ -154,7 +132,8 @@ impl<'a> Search<'a> {
     pub fn run(&mut self) {
         let whole = [0, 1].map(|d| Span::new(0, self.lines[d].len() as u32 - 1));
         let root = self.part(whole, whole);
-        let mut stack: Vec<Item> = root.map(|r| Item::Alone(r, 0, NodeRole::Root)).into_iter().collect();
+        let mut stack: Vec<Item> =
+            root.map(|r| Item::Alone(r, Visit { level: 0, role: NodeRole::Root, parent: None })).into_iter().collect();
         let mut steps = 0;
         while let Some(item) = stack.pop() {
             steps += 1;
@@ -178,7 +157,7 @@ impl<'a> Search<'a> {
                 break;
             }
             match item {
-                Item::Alone(a, level, role) => self.alone(a, level, role, &mut stack),
+                Item::Alone(a, visit) => self.alone(a, visit, &mut stack),
                 Item::Pair(a, b) => self.pair(a, b, &mut stack),
             }
         }
@@ -254,19 +233,22 @@ impl<'a> Search<'a> {
     }
 
     /// Algorithm 1.
-    fn alone(&mut self, part: Part, level: u32, role: NodeRole, stack: &mut Vec<Item>) {
-        let proved = self.window(&part.rect);
-        self.record_node(&part, level, role, proved);
+    fn alone(&mut self, part: Part, visit: Visit, stack: &mut Vec<Item>) {
+        let proved = self.windows.proved(&part.rect);
+        let parent = self.record_node(&part, visit, proved);
         if proved {
             return;
         }
         if part.rect.size().max_element() < SMALLEST {
-            self.found.open.push(([part.rect; 2], "a window could not be proved free of self-intersection"));
+            let reason = self.windows.why_open(&part.rect);
+            self.found
+                .open
+                .push(([part.rect; 2], reason.unwrap_or("a window could not be proved free of self-intersection")));
             return;
         }
         let ([first, middle, last], core) = self.children(&part);
         for (child, role) in [(first, NodeRole::First), (middle, NodeRole::Middle), (last, NodeRole::Last)] {
-            stack.extend(child.map(|c| Item::Alone(c, level + 1, role)));
+            stack.extend(child.map(|c| Item::Alone(c, Visit { level: visit.level + 1, role, parent })));
         }
         let mut pair = |a: Option<Part>, b: Option<Part>| {
             if let (Some(a), Some(b)) = (a, b) {
@@ -292,26 +274,19 @@ impl<'a> Search<'a> {
         pair(outside(last, middle, false), core);
     }
 
-    /// Notes a node that was visited.
-    fn record_node(&mut self, part: &Part, level: u32, role: NodeRole, proved: bool) {
-        let injective = self.injective.get(&key(&part.rect)).copied().unwrap_or(false);
-        if self.record.is_none() {
-            return;
-        }
+    /// Notes a node that was visited; the answer is its place in the record.
+    fn record_node(&mut self, part: &Part, visit: Visit, proved: bool) -> Option<usize> {
+        self.record.as_ref()?;
         let lines = &self.lines;
         let cell = |d: usize, x: f64| lines[d].partition_point(|&l| l < x) as u32;
         let on_grid = |x: DVec2| (0..2).all(|d| lines[d].get(cell(d, x[d]) as usize) == Some(&x[d]));
         let cells = (on_grid(part.rect.low) && on_grid(part.rect.high))
             .then(|| [0, 1].map(|d| [cell(d, part.rect.low[d]), cell(d, part.rect.high[d])]));
-        let at_cusp = self.cusp_window.get(&key(&part.rect)).is_some_and(Option::is_some);
-        let state = match (proved, injective) {
-            (_, true) => NodeState::Injective,
-            (true, false) if at_cusp => NodeState::CuspEdge,
-            (true, false) => NodeState::MiterPoint,
-            (false, false) => NodeState::Split,
-        };
-        let Some(record) = &mut self.record else { return };
-        record.nodes.push(TernaryNode { level, uv_box: self.sheet.in_surface(&part.rect), cells, role, state });
+        let state = if proved { self.windows.state(&part.rect) } else { NodeState::Split };
+        let Visit { level, role, parent } = visit;
+        let record = self.record.as_mut()?;
+        record.nodes.push(TernaryNode { level, uv_box: self.sheet.in_surface(&part.rect), cells, role, state, parent });
+        Some(record.nodes.len() - 1)
     }
 
     /// Tests the windows of 2 x 2 and 3 x 3 cells that no proved node contains.
@@ -336,7 +311,7 @@ impl<'a> Search<'a> {
                     DVec2::new(at(0, first[0]), at(1, first[1])),
                     DVec2::new(at(0, first[0] + size), at(1, first[1] + size)),
                 );
-                if !self.window(&rect) {
+                if !self.windows.proved(&rect) {
                     failed.push(FailedWindow { size, first, uv_box: self.sheet.in_surface(&rect) });
                 }
             }
@@ -349,87 +324,19 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether a window is proved injective, or to hold one miter point's branch only.
-    fn window(&mut self, rect: &Rect) -> bool {
-        let k = key(rect);
-        let proved = match self.injective.get(&k) {
-            Some(&known) => known,
-            None => {
-                self.found.windows += 1;
-                let proved = injective(&self.sheet.window_frames(rect));
-                self.injective.insert(k, proved);
-                if !proved {
-                    self.found.failed_windows += 1;
-                }
-                proved
-            }
-        };
-        proved || self.miter_window(rect) || self.window_at_cusp(rect)
-    }
-
-    /// Whether the window, grown to three times its size, holds exactly one miter point and only its branch.
-    fn miter_window(&mut self, rect: &Rect) -> bool {
-        if let Some(&known) = self.capped_window.get(&key(rect)) {
-            return known;
-        }
-        let around = rect.grown(1.0);
-        let mut inside = self
-            .miters
-            .iter()
-            .flat_map(|m| self.images(m.at).map(move |at| (at, m)))
-            .filter(|(at, _)| around.contains(*at));
-        let only = inside.next();
-        let proved = match (only, inside.next()) {
-            (Some((_, m)), None) if m.kind == MiterKind::CrossCap => {
-                cross_cap(&around, &self.sheet.jets(&around), m.null(), m.first, m.second)
-            }
-            (Some((at, m)), None) => {
-                // A copy across a seam: the window moves to the point itself.
-                degenerate::settled(self.sheet, &rect.shifted(m.at - at), m)
-            }
-            _ => false,
-        };
-        self.capped_window.insert(key(rect), proved);
-        proved
-    }
-
-    /// A point of the domain and its copies across seams.
-    fn images(&self, at: DVec2) -> impl Iterator<Item = DVec2> + use<> {
-        let turns = |d: usize| if self.sheet.periodic[d] { -1..=1 } else { 0..=0 };
-        let (us, vs) = (turns(0), turns(1));
-        us.flat_map(move |i| vs.clone().map(move |j| at + DVec2::new(f64::from(i), f64::from(j))))
-    }
-
-    /// Whether the window holds a cusp edge and nothing else; folds are noted.
-    fn window_at_cusp(&mut self, rect: &Rect) -> bool {
-        if self.cusps.is_empty() {
-            return false;
-        }
-        let known = self.cusp_window.get(&key(rect)).copied();
-        let found = known.unwrap_or_else(|| {
-            let found = cusp_window(self.sheet, self.cusps, rect);
-            self.cusp_window.insert(key(rect), found);
-            if let Some(CuspWindow::Folded(edge)) = found {
-                self.found.folds.push((edge, *rect));
-            }
-            found
-        });
-        found.is_some()
-    }
-
     /// Algorithm 2.
     fn pair(&mut self, a: Part, b: Part, stack: &mut Vec<Item>) {
         self.found.pairs += 1;
         let (ha, hb) = (self.hull(&a.rect), self.hull(&b.rect));
         let (mut touching, mut windowed) = (false, false);
-        for shift in self.images(DVec2::ZERO).collect::<Vec<_>>() {
+        for shift in self.sheet.images(DVec2::ZERO).collect::<Vec<_>>() {
             let other = b.rect.shifted(shift);
             let gap = (other.low - a.rect.high).max(a.rect.low - other.high).max(DVec2::ZERO);
             let size = a.rect.size().max(other.size());
             if gap == DVec2::ZERO {
                 touching = true;
             }
-            if gap.cmple(size * 0.8).all() && self.window(&a.rect.union(&other)) {
+            if gap.cmple(size * 0.8).all() && self.windows.proved(&a.rect.union(&other)) {
                 windowed = true;
             }
         }
@@ -440,6 +347,9 @@ impl<'a> Search<'a> {
         if let (false, Some(pa), Some(pb)) =
             (touching, self.sheet.single_piece(&a.rect), self.sheet.single_piece(&b.rect))
         {
+            if self.touches.as_ref().is_some_and(|t| t.known(&a.rect, &b.rect) != Touch::No) {
+                return;
+            }
             if a.grid.is_none() && b.grid.is_none() && self.leaves.insert((key(&a.rect), key(&b.rect))) {
                 self.found.leaf_pairs += 1;
                 if let Some(record) = &mut self.record {
@@ -450,10 +360,14 @@ impl<'a> Search<'a> {
                 Verdict::Empty | Verdict::Covered => return,
                 Verdict::Split => {}
             }
+            let job = self.job;
+            if self.touches.as_mut().is_some_and(|t| t.look(&a.rect, &b.rect, job) != Touch::No) {
+                return;
+            }
         }
         if (FINEST_COINCIDENCE..COINCIDENCE_CELL).contains(&size)
             && let (Some(pa), Some(pb)) = (self.sheet.single_piece(&a.rect), self.sheet.single_piece(&b.rect))
-            && let Some(met) = self.coincide(&a.rect, pa, &b.rect, pb)
+            && let Some(met) = coincide(self.sheet, (&a.rect, pa), (&b.rect, pb))
         {
             if met {
                 self.found.coincident.push(Coincidence { a: a.rect, b: b.rect });
@@ -461,7 +375,9 @@ impl<'a> Search<'a> {
             return;
         }
         if size < SMALLEST {
-            self.found.open.push(([a.rect, b.rect], "the surface may touch itself here"));
+            let reason = self.windows.why_open(&a.rect).or_else(|| self.windows.why_open(&b.rect));
+            let reason = reason.unwrap_or("two sheets come so near here that whether they meet could not be decided");
+            self.found.open.push(([a.rect, b.rect], reason));
             return;
         }
         let longest = |[u, v]: [f64; 2]| u.max(v);
@@ -481,27 +397,6 @@ impl<'a> Search<'a> {
         let (ra, rb) = (range(y, &ta), range(y, &tb));
         ra[0] > 1e-12 * ra[1] && rb[1] < 1e-12 * rb[0]
     }
-
-    /// Whether two boxes coincide over an area: `None` when they do not, otherwise whether points of one have their
-    /// partners in the other. A piece that continues as its neighbour meets the same points, not others: seen in the
-    /// middle, since on a seam both are one point anyway.
-    fn coincide(&self, a: &Rect, pa: usize, b: &Rect, pb: usize) -> Option<bool> {
-        let gap = 1e-11_f64.max(4.0 * self.sheet.rounding);
-        let mut met = false;
-        for k in 0..9 {
-            let p = a.low + a.size() * DVec2::new(f64::from(k % 3) * 0.5, f64::from(k / 3) * 0.5);
-            let s = self.sheet.jet_on(pa, p, 0).s;
-            let (q, distance) = foot(self.sheet, pb, b.center(), s)?;
-            if distance > gap
-                || !b.grown(1.5).contains(q)
-                || (k == 4 && (p - q - turns(self.sheet, p, q)).length() < 1e-3 * a.size().max_element())
-            {
-                return None;
-            }
-            met |= b.grown(1e-9).contains(q);
-        }
-        Some(met)
-    }
 }
 
 /// Open pairs that touch in both domains as one, so that one trouble is one entry.
@@ -519,30 +414,6 @@ pub(crate) fn merged(open: Vec<([Rect; 2], &'static str)>) -> Vec<([Rect; 2], &'
         }
     }
     out
-}
-
-/// The closest point of a (continued) piece, by Gauss-Newton from a start.
-pub(crate) fn foot(sheet: &Sheet, piece: usize, from: DVec2, s: DVec3) -> Option<(DVec2, f64)> {
-    let mut q = from;
-    for _ in 0..20 {
-        let jet = sheet.jet_on(piece, q, 1);
-        let r = s - jet.s;
-        let (e, f, g) = (jet.d[0].length_squared(), jet.d[0].dot(jet.d[1]), jet.d[1].length_squared());
-        let det = e * g - f * f;
-        if det.is_nan() || det <= 1e-14 * e * g {
-            return None;
-        }
-        let (x, y) = (jet.d[0].dot(r), jet.d[1].dot(r));
-        let d = DVec2::new(g * x - f * y, e * y - f * x) / det;
-        q += d;
-        if !q.is_finite() || q.distance(from) > 1.0 {
-            return None;
-        }
-        if d.length() < 1e-14 {
-            break;
-        }
-    }
-    Some((q, sheet.jet_on(piece, q, 0).s.distance(s)))
 }
 
 /// The direction in which two rectangles of the same parent differ.

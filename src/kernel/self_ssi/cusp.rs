@@ -13,6 +13,8 @@
 //! two derivatives S_en and S_x alone, in the plane of their values at the edge, bound the number of solutions for every
 //! (t, rho) by one, and the pairs across the edge are those. That they coincide is measured, not proved.
 //!
+//! Of rational pieces the derivatives are bounded by intervals of the quotient rule, so that windows must be smaller.
+//!
 //! How it fails: swallowtail points of an edge, rational folds too strongly weighted, and joints with one continuous
 //! derivative prove nothing; the windows stay open and are listed.
 

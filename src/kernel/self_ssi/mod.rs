@@ -8,26 +8,29 @@
 //! which proves local injectivity only; and the search certifies that no branch was missed ([`Evidence`], and
 //! `unresolved` in the result). Closed directions wrap: a seam is no self-intersection, a curve through it is one curve.
 //!
-//! Files: `sheet` (the surface prepared), `hull` and `rational` (bounds of derivatives), `window` (the window proofs), `miter`, `chart`
-//! and `march` (the equation and its tracing), `register` (the branches found), `ternary`, `pair_test` and `cover` (the
-//! search), `quad` and `leaf` (miter quadrangles), `record` (the search as data), `triple` (triple points), `cusp` (cusp edges), `degenerate` (isolated and double miter points), `region` and `outline` (coincident areas),
+//! Files: `sheet` (the surface prepared), `net`, `hull`, `jets` and `rational` (bounds of derivatives), `window` and
+//! `windows` (the window proofs), `miter`, `chart` and `march` (the equation and its tracing), `register` (the branches
+//! found), `ternary`, `pair_test` and `cover` (the search), `coincidence`, `quad` and `leaf` (miter quadrangles), `record` (the search as data), `triple` (triple points), `cusp` (cusp edges), `touch` (sheets that touch), `degenerate` (isolated and double miter points), `region` and `outline` (coincident areas),
 //! `assemble` (the result), `contour` and `section` (a miter neighbourhood cut by a plane), `model` (all surfaces).
 //!
 //! Cost: well under a millisecond for a cross-cap patch, then proportional to the length of the curves over the square
-//! root of the tolerance. How it fails: pairs of cells in which the surface touches itself without crossing are listed
+//! root of the tolerance. How it fails: pairs of cells in which sheets are tangent and cross as well are listed
 //! as unresolved, as are those left when a cap is hit; the result then is not `complete`.
 
 mod assemble;
 mod chart;
+mod coincidence;
 mod contour;
 mod cover;
 mod cusp;
 mod degenerate;
 mod hull;
+mod jets;
 pub mod leaf;
 mod march;
 mod miter;
 pub mod model;
+mod net;
 mod outline;
 mod pair_test;
 mod quad;
@@ -38,8 +41,10 @@ mod register;
 pub mod section;
 mod sheet;
 mod ternary;
+mod touch;
 mod triple;
 mod window;
+mod windows;
 
 use std::time::Instant;
 
@@ -52,6 +57,7 @@ use self::march::{End, Pace, Trace};
 use self::miter::MiterKind;
 use self::record::Record;
 use self::sheet::Sheet;
+use self::touch::Touches;
 use crate::kernel::geom::Surface;
 use crate::kernel::job::Job;
 use crate::kernel::ssi::result::{
@@ -165,15 +171,24 @@ pub fn self_intersect(
 
     job.phase("Tracing and proving");
     let mut search = Search::new(&sheet, &miters.points, &miters.cusps, options.grid, pace, options.pair_cap, job);
+    search.touches = Some(Touches::new(surface, &sheet, number, tol, tolerances.gap));
     search.record = options.record.then(Record::default);
     for miter in &miters.points {
         for trace in branches(&sheet, miter, &search.register.traces, &pace, job) {
-            search.register.add(trace);
+            // On the border of the domain the branch may have one of its preimages outside: there is none.
+            let [p, q] = trace.nodes.last().copied().unwrap_or([miter.at; 2]);
+            if trace.nodes.len() > 2 || p.distance(q) > 1e-9 || p.distance(miter.at) > 1e-9 {
+                search.register.add(trace);
+            }
         }
     }
     job.progress(0.2);
     search.run();
-    let Search { found, register, mut record, lines, .. } = search;
+    let contacts = search.touches.take().map(|t| {
+        let known = |[p, q]: [DVec2; 2]| search.register.contains([p.x, p.y, q.x, q.y]);
+        (t.contacts(known, job), t.open)
+    });
+    let Search { found, windows, register, mut record, lines, .. } = search;
     let mut traces = register.traces;
     let traversed = started.elapsed();
     job.progress(0.8);
@@ -260,7 +275,10 @@ pub fn self_intersect(
             uv: sheet.to_surface(sheet.wrapped(miter.at)),
             quad: quad.unwrap_or([miter.at; 4]).map(|c| sheet.to_surface(c)),
             radius: if quad.is_some() { radius * sheet.scale } else { sheet.rounding * sheet.scale },
-            isolated: miter.kind == MiterKind::Isolated,
+            isolated: !traces
+                .iter()
+                .flat_map(|t| t.ends)
+                .any(|e| matches!(e, End::Miter(at) if same(&sheet, at, miter.at))),
         });
     }
     let reason = "a miter point could not be separated from its surroundings";
@@ -268,7 +286,11 @@ pub fn self_intersect(
         result.unresolved.push(open(pair, reason));
     }
     result.unresolved.extend(found.open.iter().map(|(pair, reason)| open(*pair, reason)));
-    for area in region::regions(&sheet, &found.coincident, &found.folds, &miters.cusps) {
+    let (contacts, touching) = contacts.unwrap_or_default();
+    result.unresolved.extend(touching.iter().chain(&contacts.open).map(|(pair, reason)| open(*pair, reason)));
+    result.junctions.extend(contacts.points);
+    result.curves.extend(contacts.curves);
+    for area in region::regions(&sheet, &found.coincident, &windows.folds, &miters.cusps) {
         let number = result.regions.len();
         let loops: Vec<Vec<CurvePoint>> =
             area.loops.iter().map(|l| l.iter().map(|&pair| assembler.point(pair)).collect()).collect();
@@ -297,8 +319,8 @@ pub fn self_intersect(
     result.time_ms =
         Times { build: ms(built), traverse: ms(traversed - built), curves: ms(started.elapsed() - traversed) };
     let evidence = Evidence {
-        windows: found.windows,
-        failed_windows: found.failed_windows,
+        windows: windows.tested,
+        failed_windows: windows.failed,
         pairs: found.pairs,
         miter_cells: miters.cells,
     };

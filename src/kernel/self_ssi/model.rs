@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::{SelfIntersectError, SelfIntersectOptions, SelfIntersection, self_intersect};
 use crate::kernel::geom::Surface;
 use crate::kernel::job::Job;
-use crate::kernel::ssi::result::{CurveEnd, Intersection};
+use crate::kernel::ssi::result::Intersection;
 
 /// Intersects each surface with itself, in parallel; the results are in the order of the surfaces and their numbers are
 /// `numbers`. Progress counts surfaces. Cancelled: surfaces that were not reached are incomplete and empty.
@@ -29,32 +29,7 @@ pub fn self_intersect_all<S: AsRef<Surface> + Sync>(
 pub fn merged(parts: impl IntoIterator<Item = Intersection>) -> Intersection {
     let mut all = Intersection { complete: true, ..Intersection::default() };
     for part in parts {
-        append(&mut all, part);
+        all.append(part);
     }
     all
-}
-
-/// Adds the result of one more surface, renumbering what its curves refer to.
-fn append(all: &mut Intersection, mut one: Intersection) {
-    let (miters, regions) = (all.miters.len(), all.regions.len());
-    let junctions = all.junctions.len();
-    for curve in &mut one.curves {
-        for (end, id) in curve.ends.iter().zip(&mut curve.end_ids) {
-            let first = if *end == CurveEnd::Junction { junctions } else { miters };
-            *id = id.map(|id| id + first);
-        }
-        curve.region = curve.region.map(|r| r + regions);
-    }
-    all.complete &= one.complete;
-    all.tol = all.tol.max(one.tol);
-    all.curves.append(&mut one.curves);
-    all.junctions.append(&mut one.junctions);
-    all.miters.append(&mut one.miters);
-    all.regions.append(&mut one.regions);
-    all.unresolved.append(&mut one.unresolved);
-    all.counts.leaf_pairs += one.counts.leaf_pairs;
-    all.counts.nodes_built += one.counts.nodes_built;
-    all.time_ms.build += one.time_ms.build;
-    all.time_ms.traverse += one.time_ms.traverse;
-    all.time_ms.curves += one.time_ms.curves;
 }

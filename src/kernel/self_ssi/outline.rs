@@ -8,7 +8,7 @@
 use glam::DVec2;
 
 use super::chart::near;
-use super::cover::Coincidence;
+use super::coincidence::Coincidence;
 use super::cusp::{CuspEdge, CuspNode};
 use super::hull::Rect;
 use super::march::turns;

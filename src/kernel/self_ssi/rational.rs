@@ -2,11 +2,11 @@
 //!
 //! First derivatives: (P_u w - P w_u) / w^2 is rational with the positive weights of w^2, so that quotients of Bernstein
 //! coefficients are its control points, for u and v together. Second derivatives: interval arithmetic on
-//! S_uu = (P_uu - 2 w_u S_u - w_uu S) / w. Both with P moved to a local origin, so that they converge with the rectangle.
+//! S_uu = (P_uu - 2 w_u S_u - w_uu S) / w, and third ones in the same way. All with P moved to a local origin, so that they converge with the rectangle.
 
 use glam::{DVec2, DVec3, DVec4};
 
-use super::hull::differences;
+use super::net::{derivative, differences};
 use super::sheet::Sheet;
 use crate::kernel::geom::{Aabb, MAX_DEGREE};
 
@@ -152,6 +152,30 @@ impl Quotient {
         self.p[d].minus(self.s.times(self.w[d])).times(self.over_w)
     }
 
+    /// Bounds of the third derivatives uuu, uuv, uvv, vvv; `net` and `size` are those that it was made of.
+    pub fn third(&self, sheet: &Sheet, net: &[DVec4], size: DVec2) -> [Interval3; 4] {
+        let origin = net.iter().fold(DVec3::ZERO, |sum, h| sum + h.truncate() / h.w) / net.len() as f64;
+        let p: Vec<DVec3> = net.iter().map(|h| h.truncate() - origin * h.w).collect();
+        let w: Vec<DVec3> = net.iter().map(|h| DVec3::X * h.w).collect();
+        // Two directions as the place of their second derivative among uu, uv, vv.
+        let second = |a: usize, b: usize| self.second(a + b, a, b);
+        [0, 1, 2, 3].map(|k| {
+            // k derivatives by v, 3 - k by u.
+            let [a, b, c] = [0, 1, 2].map(|i| usize::from(i >= 3 - k));
+            let of = |net: &[DVec3]| Interval3::of(&derivative(net, sheet.degree, [3 - k, k], size));
+            let www = of(&w);
+            of(&p)
+                .minus(second(b, c).times(self.w[a]))
+                .minus(second(a, c).times(self.w[b]))
+                .minus(second(a, b).times(self.w[c]))
+                .minus(self.first(c).times(self.ww[a + b]))
+                .minus(self.first(b).times(self.ww[a + c]))
+                .minus(self.first(a).times(self.ww[b + c]))
+                .minus(self.s.times([www.low.x, www.high.x]))
+                .times(self.over_w)
+        })
+    }
+
     pub fn second(&self, at: usize, a: usize, b: usize) -> Interval3 {
         self.pp[at]
             .minus(self.first(a).times(self.w[b]))
@@ -192,5 +216,34 @@ mod tests {
             let corner = sheet.jet(rect.low, 1);
             assert!(frames[0][0].distance(corner.d[0]) < 1e-11 && frames[0][1].distance(corner.d[1]) < 1e-11);
         }
+    }
+
+    #[test]
+    fn rational_third_derivatives_lie_in_their_bounds() {
+        let (ku, kv) = (Knots::bezier(3, 0.0, 1.0).unwrap(), Knots::bezier(2, 0.0, 1.0).unwrap());
+        let h = |at: usize, m: usize| ((at * 7919 + 13) % m) as f64 / m as f64;
+        let points = (0..12).map(|at| DVec3::new(h(at, 31), h(at, 37), h(at, 41))).collect();
+        let weights = (0..12).map(|at| 0.8 + 0.3 * h(at, 23)).collect();
+        let surface = Surface::new(ku, kv, points, Some(weights)).unwrap();
+        let sheet = Sheet::new(&surface, 1e-12);
+        let mut widths = Vec::new();
+        for size in [0.2, 0.02] {
+            let rect = Rect::new(DVec2::new(0.4, 0.3), DVec2::new(0.4 + size, 0.3 + size));
+            let third = sheet.third_hull(&rect).unwrap();
+            for k in 0..4 {
+                let [low, high] = range(DVec3::X, &third[k]);
+                widths.push(high - low);
+                for f in [0.0, 0.3, 1.0] {
+                    let d = surface.jet(rect.low + rect.size() * f, 3).d[3 - k][k] / sheet.scale;
+                    for y in [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(1.0, -2.0, 0.5)] {
+                        let [low, high] = range(y, &third[k]);
+                        let slack = 1e-9 * (high - low);
+                        assert!(low - slack <= y.dot(d) && y.dot(d) <= high + slack, "{k}: {low} {} {high}", y.dot(d));
+                    }
+                }
+            }
+        }
+        // They converge with the rectangle.
+        assert!((0..4).all(|k| widths[4 + k] < 0.2 * widths[k]), "{widths:?}");
     }
 }

@@ -47,6 +47,8 @@ pub struct TernaryNode {
     pub role: NodeRole,
     /// What was proved.
     pub state: NodeState,
+    /// The place among the nodes of the one that it was split from; `None` for the root.
+    pub parent: Option<usize>,
 }
 
 /// A window of `size` x `size` cells that is not proved free of self-intersection.

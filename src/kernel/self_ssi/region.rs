@@ -9,7 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec2;
 
-use super::cover::{Coincidence, foot};
+use super::coincidence::{Coincidence, foot};
 use super::cusp::CuspEdge;
 use super::hull::Rect;
 use super::outline;

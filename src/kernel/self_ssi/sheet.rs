@@ -170,6 +170,13 @@ impl Sheet {
         self.breaks[0].len() - 1
     }
 
+    /// A point of the domain and its copies across seams.
+    pub fn images(&self, at: DVec2) -> impl Iterator<Item = DVec2> + use<> {
+        let turns = |d: usize| if self.periodic[d] { -1..=1 } else { 0..=0 };
+        let (us, vs) = (turns(0), turns(1));
+        us.flat_map(move |i| vs.clone().map(move |j| at + DVec2::new(f64::from(i), f64::from(j))))
+    }
+
     /// The parameter brought into [0, 1] where its direction is closed.
     pub fn wrapped(&self, p: DVec2) -> DVec2 {
         let wrap = |d: usize, t: f64| if self.periodic[d] && !(0.0..=1.0).contains(&t) { t - t.floor() } else { t };

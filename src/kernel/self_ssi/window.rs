@@ -19,7 +19,8 @@
 
 use glam::{DMat2, DMat3, DVec2, DVec3};
 
-use super::hull::{Jets, Rect};
+use super::hull::Rect;
+use super::jets::Jets;
 
 /// How many directions P are tried.
 const TRIES: usize = 24;

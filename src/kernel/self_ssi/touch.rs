@@ -1,0 +1,215 @@
+//! Places where two sheets of the surface touch without crossing: in a point, or along a curve.
+//!
+//! There the pair test has no parameter along which solutions are unique, however small the boxes. The two places, boxes
+//! apart in the domain, are two surfaces that touch: the intersector of two surfaces decides them, with its proof (thesis
+//! 5, [`crate::kernel::ssi`]). Where that is complete and holds points of contact and tangential curves only, every pair
+//! of boxes inside is settled. Settled places that hang together count as one, with the box around them; at the end that
+//! is intersected as a whole, so that a curve of contact is one curve and the whole place is proved. Curves that cross in
+//! it must be known to the search.
+//!
+//! How it fails: where the sheets are tangent and cross as well the branches found on either side would have to be
+//! joined with those of the search; such a place is listed as unresolved, once, with that reason.
+
+use glam::DVec2;
+
+use super::hull::Rect;
+use super::sheet::Sheet;
+use crate::kernel::geom::Surface;
+use crate::kernel::job::Job;
+use crate::kernel::ssi::result::{CurveKind, Intersection, IntersectionCurve, Junction, JunctionKind};
+use crate::kernel::ssi::{SsiOptions, TangencyPoint, intersect, tangency};
+
+/// Contact is looked for between boxes of these sizes.
+const LARGEST: f64 = 1.0 / 24.0;
+const FINEST: f64 = 1.0 / 2048.0;
+/// The least difference of curvatures that counts, for a surface of size 1.
+const LEAST_BEND: f64 = 1e-3;
+/// The most places that are handed to the intersector.
+const MOST: usize = 512;
+/// Why a place with crossing tangent sheets is open.
+const CROSSING: &str = "two sheets are tangent here and cross: the branches through this place are not joined";
+/// Why a place is open that the intersector did not settle.
+const UNSETTLED: &str = "two sheets touch here in a way that could not be decided";
+
+/// What became of a pair of boxes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Touch {
+    /// Nothing touches here, as far as could be seen.
+    No,
+    /// Everything inside is known.
+    Settled,
+    /// The place is listed as unresolved, once for all boxes in it.
+    Open,
+}
+
+/// The places where sheets touch.
+pub(crate) struct Touches<'a> {
+    surface: &'a Surface,
+    sheet: &'a Sheet,
+    number: usize,
+    options: SsiOptions,
+    gap: f64,
+    /// Settled places, those that hang together as one where its two boxes stay apart.
+    settled: Vec<[Rect; 2]>,
+    /// What is open, with the reason.
+    pub open: Vec<([Rect; 2], &'static str)>,
+    tried: usize,
+}
+
+/// What touches.
+#[derive(Debug, Default)]
+pub(crate) struct Contacts {
+    pub points: Vec<Junction>,
+    pub curves: Vec<IntersectionCurve>,
+    /// Places whose curves could not be made one.
+    pub open: Vec<([Rect; 2], &'static str)>,
+}
+
+impl<'a> Touches<'a> {
+    /// `tol` and `gap` are in model units.
+    pub fn new(surface: &'a Surface, sheet: &'a Sheet, number: usize, tol: f64, gap: f64) -> Self {
+        let options = SsiOptions { tol: Some(tol), gap_tol: Some(gap), ..SsiOptions::default() };
+        Self { surface, sheet, number, options, gap, settled: Vec::new(), open: Vec::new(), tried: 0 }
+    }
+
+    /// Whether a pair of boxes lies in a place that was looked at.
+    pub fn known(&self, a: &Rect, b: &Rect) -> Touch {
+        let inside = |[x, y]: &[Rect; 2]| holds(x, a) && holds(y, b) || holds(x, b) && holds(y, a);
+        match () {
+            () if self.settled.iter().any(inside) => Touch::Settled,
+            () if self.open.iter().any(|(pair, _)| inside(pair)) => Touch::Open,
+            () => Touch::No,
+        }
+    }
+
+    /// Looks for contact in and around a pair of boxes, each in [0, 1]^2 on one piece, which the pair test left open.
+    pub fn look(&mut self, a: &Rect, b: &Rect, job: &Job) -> Touch {
+        let size = a.size().max_element().max(b.size().max_element());
+        if !(FINEST..LARGEST).contains(&size) || self.tried >= MOST || !self.nearly_touch(a, b) {
+            return Touch::No;
+        }
+        let place = [a, b].map(|r| {
+            let r = r.grown(1.0);
+            Rect::new(r.low.max(DVec2::ZERO), r.high.min(DVec2::ONE))
+        });
+        if overlap(&place[0], &place[1]) {
+            return Touch::No;
+        }
+        let Some(parts) = self.parts(&place) else { return Touch::No };
+        let [uv, st] = [a, b].map(|r| self.sheet.to_surface(r.center()));
+        let contact = tangency(&parts[0], &parts[1], uv, st).and_then(|t| t.point);
+        let [near_a, near_b] = [a, b].map(|r| self.sheet.in_surface(&r.grown(0.5)));
+        let within = |[u, v]: [[f64; 2]; 2], p: DVec2| p.x >= u[0] && p.x <= u[1] && p.y >= v[0] && p.y <= v[1];
+        // Where the sheets agree to second order they may coincide, which has its own test.
+        let size = self.surface.bounds().diagonal();
+        let bends = |c: &TangencyPoint| c.curvatures[0].abs() * size > LEAST_BEND;
+        let touches = |c: &TangencyPoint| c.gap.abs() <= self.gap && within(near_a, c.uv) && within(near_b, c.st);
+        if !contact.is_some_and(|c| bends(&c) && touches(&c)) {
+            return Touch::No;
+        }
+        self.tried += 1;
+        let Some(found) = self.met(&parts, job) else { return Touch::No };
+        let touches = found.curves.iter().all(|c| c.kind == CurveKind::Tangential)
+            && found.junctions.iter().all(|j| j.kind == JunctionKind::Isolated)
+            && found.regions.is_empty();
+        if found.complete && touches {
+            self.settle(place);
+            return Touch::Settled;
+        }
+        if !found.regions.is_empty() || job.is_cancelled() {
+            // A coincident region has its own test.
+            return Touch::No;
+        }
+        self.open.push((place, if found.complete { CROSSING } else { UNSETTLED }));
+        Touch::Open
+    }
+
+    /// A cheap look at the middles: near each other for their size, with nearly parallel tangent planes.
+    fn nearly_touch(&self, a: &Rect, b: &Rect) -> bool {
+        let (ja, jb) = (self.sheet.jet(a.center(), 1), self.sheet.jet(b.center(), 1));
+        let normal = |d: [glam::DVec3; 2]| d[0].cross(d[1]).normalize_or_zero();
+        let reach = |d: [glam::DVec3; 2], r: &Rect| d[0].length() * r.size().x + d[1].length() * r.size().y;
+        normal(ja.d).cross(normal(jb.d)).length() < 0.5 && ja.s.distance(jb.s) <= reach(ja.d, a) + reach(jb.d, b)
+    }
+
+    fn parts(&self, place: &[Rect; 2]) -> Option<[Surface; 2]> {
+        let part = |r: &Rect| {
+            let [u, v] = self.sheet.in_surface(r);
+            self.surface.restricted(u, v).ok()
+        };
+        Some([part(&place[0])?, part(&place[1])?])
+    }
+
+    fn met(&self, parts: &[Surface; 2], job: &Job) -> Option<Intersection> {
+        let [a, b] = parts;
+        intersect(&[(self.number, a)], &[(self.number, b)], &self.options, &job.part(0.0, 0.0)).ok()
+    }
+
+    /// Adds a settled place; places that it hangs together with become one, unless its boxes would overlap.
+    fn settle(&mut self, place: [Rect; 2]) {
+        let mut all = place;
+        let mut rest = self.settled.clone();
+        // A box that grows may reach others.
+        while let Some(at) = rest.iter().position(|o| joined(o, &all).is_some()) {
+            let Some(one) = joined(&rest.swap_remove(at), &all) else { break };
+            all = one;
+        }
+        if overlap(&all[0], &all[1]) {
+            self.settled.push(place);
+        } else {
+            rest.push(all);
+            self.settled = rest;
+        }
+    }
+
+    /// The contacts of all settled places. `known` says whether a pair of points of [0, 1]^2 lies on a curve of the search.
+    pub fn contacts(&self, known: impl Fn([DVec2; 2]) -> bool, job: &Job) -> Contacts {
+        let mut out = Contacts::default();
+        for &place in &self.settled {
+            let found = self.parts(&place).and_then(|parts| self.met(&parts, job));
+            let Some(found) = found.filter(|f| f.complete && f.regions.is_empty()) else {
+                out.open.push((place, "two sheets touch along a curve that could not be followed as one"));
+                continue;
+            };
+            let new = |c: &IntersectionCurve| {
+                let middle = c.points.get(c.points.len() / 2);
+                middle.is_some_and(|p| !known([p.uv, p.st].map(|uv| self.sheet.in_unit(uv))))
+            };
+            if found.curves.iter().any(|c| c.kind != CurveKind::Tangential && new(c)) {
+                out.open.push((place, CROSSING));
+            }
+            out.points.extend(found.junctions.into_iter().filter(|j| j.kind == JunctionKind::Isolated));
+            out.curves.extend(found.curves.into_iter().filter(|c| c.kind == CurveKind::Tangential));
+        }
+        out
+    }
+}
+
+fn holds(outer: &Rect, inner: &Rect) -> bool {
+    outer.contains(inner.low) && outer.contains(inner.high)
+}
+
+fn overlap(a: &Rect, b: &Rect) -> bool {
+    a.low.cmplt(b.high).all() && b.low.cmplt(a.high).all()
+}
+
+/// Two places that overlap in both boxes as one.
+fn joined(a: &[Rect; 2], b: &[Rect; 2]) -> Option<[Rect; 2]> {
+    let with = |[x, y]: [Rect; 2]| (overlap(&x, &b[0]) && overlap(&y, &b[1])).then(|| [x.union(&b[0]), y.union(&b[1])]);
+    with(*a).or_else(|| with([a[1], a[0]]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_that_overlap_in_both_boxes_are_one_whichever_comes_first() {
+        let rect = |x: f64| Rect::new(DVec2::new(x, 0.0), DVec2::new(x + 0.3, 0.1));
+        let far = |x: f64| rect(x).shifted(DVec2::new(0.0, 0.5));
+        let one = joined(&[rect(0.0), far(0.0)], &[far(0.2), rect(0.2)]).unwrap();
+        assert!(one.iter().all(|r| (r.size().x - 0.5).abs() < 1e-12), "{one:?}");
+        assert!(one[0].low.y == 0.5 && one[1].low.y == 0.0, "in the order of the second");
+        assert!(joined(&[rect(0.0), far(0.0)], &[rect(0.2), far(0.5)]).is_none());
+    }
+}
