@@ -28,6 +28,20 @@ impl Default for UvNavigation {
     }
 }
 
+impl UvNavigation {
+    /// Shows a box of parameters, low and high corner, as large as leaves some room around it.
+    pub fn around(domain: [[f64; 2]; 2], [low, high]: [DVec2; 2]) -> Self {
+        /// The part of the fitted domain that the box takes.
+        const PART: f64 = 0.7;
+        let from = DVec2::new(domain[0][0], domain[1][0]);
+        let extent = DVec2::new(domain[0][1], domain[1][1]) - from;
+        let share = ((high - low) / extent).abs().max_element();
+        let zoom = if share > 0.0 { (PART / share).clamp(0.5, CLOSEST) } else { CLOSEST };
+        let center = ((0.5 * (low + high) - from) / extent).clamp(DVec2::ZERO, DVec2::ONE);
+        if zoom.is_finite() && center.is_finite() { Self { zoom, center } } else { Self::default() }
+    }
+}
+
 /// From parameters to pixels of the pane (from its upper left corner, y downwards) and back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UvMap {
@@ -100,6 +114,16 @@ mod tests {
 
     const DOMAIN: [[f64; 2]; 2] = [[-2.0, 6.0], [10.0, 11.0]];
     const SIZE: DVec2 = DVec2::new(400.0, 240.0);
+
+    #[test]
+    fn a_box_that_is_gone_to_is_in_the_middle_of_the_pane_and_fills_most_of_it() {
+        let (low, high) = (DVec2::new(1.0, 10.25), DVec2::new(1.002, 10.2501));
+        let map = UvMap::new(DOMAIN, SIZE, UvNavigation::around(DOMAIN, [low, high]));
+        let [a, b] = [low, high].map(|uv| map.to_pixel(uv));
+        assert!((0.5 * (a + b)).distance(0.5 * SIZE) < 1e-6);
+        assert!((b - a).abs().max_element() > 80.0 && (b - a).abs().cmplt(SIZE).all());
+        assert_eq!(UvNavigation::around(DOMAIN, [low, low]).zoom, CLOSEST);
+    }
 
     #[test]
     fn a_fitted_domain_is_inside_the_pane_with_u_to_the_right_and_v_up() {

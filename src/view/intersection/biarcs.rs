@@ -3,7 +3,6 @@
 use glam::{DVec2, DVec3};
 
 use super::Found;
-use crate::kernel::geom::Surface;
 use crate::kernel::ssi::biarc::Arc;
 use crate::kernel::ssi::fit_biarcs;
 
@@ -41,8 +40,7 @@ pub struct Biarcs {
 /// Fits biarcs to a curve of a result. An error is one line for people.
 pub fn biarcs(found: &Found, curve: usize) -> Result<Biarcs, String> {
     let of = found.result.curves.get(curve).ok_or("the curve is gone")?;
-    let surfaces: Vec<(usize, &Surface)> = found.subjects.iter().map(|s| s.surface.as_ref()).enumerate().collect();
-    let fit = fit_biarcs(of, &surfaces, found.result.tol).map_err(|e| e.to_string())?;
+    let fit = fit_biarcs(of, &found.surfaces(), found.result.tol).map_err(|e| e.to_string())?;
     let mut out =
         Biarcs { curve, drawn: Vec::new(), joints: Vec::new(), count: 0, bound: fit.bound, within: fit.within };
     for run in &fit.runs {

@@ -1,6 +1,7 @@
 //! The coverage certificate in plain words: what was proved, and what was not.
 
 use super::Found;
+use crate::kernel::intersect::Engine;
 use crate::kernel::ssi::result::CurveEnd;
 
 /// How good the news is.
@@ -37,6 +38,8 @@ pub fn certificate(found: &Found, length: &dyn Fn(f64) -> String) -> Certificate
     let place = if found.with_itself { "pair of places of the surface" } else { "pair of places of the surfaces" };
     let mut sentences = Vec::new();
     let headline = match verdict {
+        Verdict::Proved if found.engine == Engine::Mesh && found.is_empty() => "No triangles meet".to_owned(),
+        Verdict::Proved if found.engine == Engine::Mesh => "Complete on the triangles".to_owned(),
         Verdict::Proved if found.is_empty() && found.with_itself => "No self-intersection".to_owned(),
         Verdict::Proved if found.is_empty() => "The surfaces do not meet".to_owned(),
         Verdict::Proved => "Complete: no branch is missing".to_owned(),
@@ -45,6 +48,11 @@ pub fn certificate(found: &Found, length: &dyn Fn(f64) -> String) -> Certificate
         Verdict::Stopped => "Stopped: this is what was ready".to_owned(),
     };
     match verdict {
+        Verdict::Proved if found.engine == Engine::Mesh => sentences.push(
+            "Every pair of triangles was tested. Surfaces were cut into triangles first, so a branch smaller than these \
+             may be missing; only on exact surfaces can it be proved that none is."
+                .to_owned(),
+        ),
         Verdict::Proved => sentences.push(format!(
             "Every {place} was proved empty, or lies on one of the curves, at a point of contact or in a coincident \
              region listed here."

@@ -108,6 +108,10 @@ impl Local {
 /// nothing to compare.
 pub fn contact(found: &Found, a: usize, uv: DVec2, b: usize, st: DVec2) -> Result<Contact, &'static str> {
     let gone = "a surface is gone";
+    let is_mesh = |n: usize| found.subjects.get(n).is_some_and(|s| s.surface().is_none());
+    if is_mesh(a) || is_mesh(b) {
+        return Err("one of them is a mesh: it has no curvature to compare");
+    }
     let local = Local::new(found, a, uv).ok_or("the first surface has no normal here")?;
     let other = found.surface(b).ok_or(gone)?;
     let n = local.curvature.normal;

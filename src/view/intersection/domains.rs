@@ -78,6 +78,11 @@ fn picture(found: &Found, number: usize, focus: Focus, cursor: Option<OnCurve>, 
             let rgb = Class::CoincidentBoundary.style(dark).rgb;
             out.marks.push(mark(UvMark::region(loops), item, rgb, format!("Overlap {}", k + 1)).width(0.0));
         }
+        for hatch in found.hatches.get(k).into_iter().flatten().filter(|h| h.number == number) {
+            let rgb = Class::CoincidentBoundary.style(dark).rgb;
+            let line = |l: &Vec<DVec2>| mark(UvMark::polyline(l.clone()), item, rgb, format!("Overlap {}", k + 1));
+            out.marks.extend(hatch.lines.iter().map(|l| line(l).width(1.0)));
+        }
     }
     for (k, u) in r.unresolved.iter().enumerate() {
         let rgb = Class::Unresolved.style(dark).rgb;
@@ -173,7 +178,7 @@ fn preimage(p: &CurvePoint, number: usize, side: usize) -> Option<DVec2> {
 }
 
 /// The preimage of a curve in one domain, broken where it leaves the surface and where it jumps across a seam.
-fn runs(found: &Found, points: &[CurvePoint], number: usize, side: usize) -> Vec<Vec<DVec2>> {
+pub fn runs(found: &Found, points: &[CurvePoint], number: usize, side: usize) -> Vec<Vec<DVec2>> {
     let mut out: Vec<Vec<DVec2>> = Vec::new();
     let mut last: Option<&CurvePoint> = None;
     for p in points {

@@ -4,7 +4,9 @@
 use std::sync::Arc;
 
 use super::Found;
-use crate::kernel::geom::{Curve, Surface};
+use crate::kernel::geom::Curve;
+use crate::kernel::intersect::Engine;
+use crate::kernel::mesh::body::Body;
 use crate::kernel::ssi::fit_splines;
 use crate::kernel::ssi::result::CurveKind;
 use crate::model::document::{Document, Shape, Unit};
@@ -19,13 +21,21 @@ pub struct Kept {
     pub notes: Vec<String>,
 }
 
-/// Cubic B-splines through the curves with these numbers. The curves of a result end at junctions, so that each is one
+/// Cubic B-splines through the curves with these numbers; of triangulations the polylines are the curves. The curves of a result end at junctions, so that each is one
 /// piece between two of them.
 pub fn curves(found: &Found, which: impl IntoIterator<Item = usize>) -> Kept {
-    let surfaces: Vec<(usize, &Surface)> = found.subjects.iter().map(|s| s.surface.as_ref()).enumerate().collect();
+    let surfaces = found.surfaces();
     let mut kept = Kept::default();
     for k in which {
         let Some(curve) = found.result.curves.get(k) else { continue };
+        if found.engine == Engine::Mesh {
+            let points: Vec<_> = curve.points.iter().map(|p| p.xyz).collect();
+            match Curve::polyline(&points) {
+                Ok(line) => kept.curves.push((name(found, k), Arc::new(line))),
+                Err(error) => kept.notes.push(format!("curve {} was left out: {error}", k + 1)),
+            }
+            continue;
+        }
         match fit_splines(curve, &surfaces, found.result.tol) {
             Ok(fit) => {
                 if !fit.within {
@@ -44,9 +54,25 @@ pub fn traces(found: &Found, unit: Unit) -> Traces {
     let mut model = Document::new(unit);
     // The numbers of the result are the places of the surfaces in their document.
     for subject in &found.subjects {
-        model.add(subject.name.clone(), Shape::Surface(Arc::clone(&subject.surface)), None);
+        match (&subject.body, subject.surface()) {
+            (Body::Facets(facets), _) => model.add(subject.name.clone(), Shape::Mesh(Arc::clone(facets)), None),
+            (_, Some(surface)) => model.add(subject.name.clone(), Shape::Surface(Arc::clone(surface)), None),
+            (_, None) => continue,
+        };
+    }
+    if found.engine == Engine::Mesh {
+        return polylines(found, &model);
     }
     traces_of(&found.result, &model, found.result.tol)
+}
+
+/// The curves as polylines, without curves on surfaces.
+fn polylines(found: &Found, model: &Document) -> Traces {
+    let mut document = Document::new(model.unit);
+    let kept = curves(found, 0..found.result.curves.len());
+    let curves = kept.curves.into_iter().map(|(name, c)| document.add(name, Shape::Curve(c), None)).collect();
+    let bound = found.result.curves.iter().map(|c| c.error_bound).fold(0.0, f64::max);
+    Traces { document, curves, traces: Vec::new(), bound, notes: kept.notes }
 }
 
 fn name(found: &Found, k: usize) -> String {

@@ -4,18 +4,21 @@
 //! entities of the document. From it come the drawing ([`marks`]), the list ([`list`]), the certificate in words
 //! ([`certificate`]), the cursor that runs along a curve in space and in both domains ([`cursor`]), the gap between
 //! two surfaces as a field ([`gap`]), what two surfaces do to second order in one point ([`contact`]), and free curves
-//! of the document ([`keep`]).
+//! of the document ([`keep`]). The results of the two engines are laid over one another by [`compare`].
 
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 
 use crate::kernel::geom::{Aabb, Surface};
+use crate::kernel::intersect::Engine;
+use crate::kernel::mesh::body::Body;
 use crate::kernel::ssi::result::{CurvePoint, Intersection};
-use crate::model::document::{Document, EntityId};
+use crate::model::document::{Document, Entity, EntityId, Shape};
 
 pub mod biarcs;
 pub mod certificate;
+pub mod compare;
 pub mod compute;
 pub mod contact;
 pub mod cursor;
@@ -29,8 +32,10 @@ pub mod picks;
 pub mod plane;
 pub mod style;
 
+pub use compare::Comparison;
 pub use compute::{Request, compute};
 pub use cursor::OnCurve;
+pub use hatch::Hatch;
 pub use marks::Drawing;
 pub use picks::{Picks, Task};
 pub use style::Class;
@@ -42,19 +47,32 @@ pub struct Subject {
     pub id: EntityId,
     /// Its name.
     pub name: String,
-    /// Its surface.
-    pub surface: Arc<Surface>,
-    /// Whether it is drawn.
-    pub visible: bool,
+    /// What of it counts: all of a surface or patch, the inside of a face, the triangles of a mesh or block.
+    pub body: Body,
 }
 
-/// Every surface and patch of a document, in its order.
+impl Subject {
+    /// Its surface, of a face the whole surface under it; a mesh has none.
+    pub fn surface(&self) -> Option<&Arc<Surface>> {
+        self.body.surface()
+    }
+}
+
+/// What of an entity can be intersected.
+pub fn body_of(entity: &Entity) -> Option<Body> {
+    match &entity.shape {
+        Shape::Face(face) => Some(Body::Face(Arc::clone(face))),
+        Shape::Mesh(facets) | Shape::Block(facets) => Some(Body::Facets(Arc::clone(facets))),
+        _ => entity.surface().map(|surface| Body::Surface(Arc::clone(surface))),
+    }
+}
+
+/// Everything of a document that can be intersected: surfaces, faces and patches in its order, then meshes and blocks.
 pub fn subjects(document: &Document) -> Vec<Subject> {
-    let subject = |e: &crate::model::document::Entity| {
-        let surface = Arc::clone(e.surface()?);
-        Some(Subject { id: e.id, name: e.name.clone(), surface, visible: e.visible })
-    };
-    document.entities().iter().filter_map(|e| subject(e)).collect()
+    let subject = |e: &Entity| Some(Subject { id: e.id, name: e.name.clone(), body: body_of(e)? });
+    let mut all: Vec<Subject> = document.entities().iter().filter_map(|e| subject(e)).collect();
+    all.sort_by_key(|s| s.surface().is_none());
+    all
 }
 
 /// One thing in a result.
@@ -81,6 +99,10 @@ pub struct Found {
     pub result: Intersection,
     /// Whether surfaces were intersected with themselves.
     pub with_itself: bool,
+    /// The engine that found it.
+    pub engine: Engine,
+    /// The hatching of regions that run over several patches, one list for each region.
+    pub hatches: Vec<Vec<Hatch>>,
     /// Whether it was stopped before it was done; then this is what was ready.
     pub cancelled: bool,
     /// What the kernel warned of.
@@ -88,9 +110,15 @@ pub struct Found {
 }
 
 impl Found {
-    /// A surface by its number in the result.
+    /// A surface by its number in the result; a mesh has none.
     pub fn surface(&self, number: usize) -> Option<&Arc<Surface>> {
-        self.subjects.get(number).map(|s| &s.surface)
+        self.subjects.get(number).and_then(Subject::surface)
+    }
+
+    /// The surfaces with their numbers in the result.
+    pub fn surfaces(&self) -> Vec<(usize, &Surface)> {
+        let all = self.subjects.iter().enumerate();
+        all.filter_map(|(n, s)| Some((n, s.surface()?.as_ref()))).collect()
     }
 
     /// The entity of a number in the result.
@@ -118,10 +146,11 @@ impl Found {
             && r.unresolved.is_empty()
     }
 
-    /// The diagonal of a box around the surfaces that take part.
+    /// The diagonal of a box around what takes part.
     pub fn size(&self) -> f64 {
         let numbers = self.numbers();
-        let bounds = numbers.iter().filter_map(|&n| self.surface(n)).fold(Aabb::EMPTY, |b, s| b.union(&s.bounds()));
+        let taking_part = numbers.iter().filter_map(|&n| self.subjects.get(n));
+        let bounds = taking_part.fold(Aabb::EMPTY, |b, s| b.union(&s.body.bounds()));
         if bounds.is_empty() { 1.0 } else { bounds.diagonal().max(f64::MIN_POSITIVE) }
     }
 
@@ -159,7 +188,11 @@ impl Found {
     pub fn joined(&self, p: &CurvePoint, q: &CurvePoint, side: usize) -> bool {
         let of = |p: &CurvePoint| if side == 0 { (p.a, p.uv) } else { (p.b, p.st) };
         let ((n, from), (m, to)) = (of(p), of(q));
-        let Some(surface) = self.surface(n).filter(|_| n == m) else { return false };
+        // On a mesh parameters mean nothing: there is no seam to jump across.
+        let Some(surface) = self.surface(n) else { return n == m };
+        if n != m {
+            return false;
+        }
         let [u, v] = surface.domain();
         let step = (to - from).abs() / DVec2::new(u[1] - u[0], v[1] - v[0]);
         if !(step.max_element() > 0.4) {

@@ -1,6 +1,7 @@
-//! Which surfaces go into an intersection: two sets, all pairs of the visible ones, or each with itself.
+//! What goes into an intersection: two sets of bodies, all pairs of the visible ones, or surfaces, each with itself.
 
-use crate::model::document::{Document, EntityId};
+use crate::kernel::intersect::Engine;
+use crate::model::document::{Document, Entity, EntityId};
 
 /// What is intersected with what.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,6 +24,8 @@ pub struct Picks {
     pub sides: [Vec<EntityId>; 2],
     /// The set that the next click goes to.
     pub filling: usize,
+    /// Which engine; the one that can take what is picked when left out.
+    pub engine: Option<Engine>,
     /// What the last click was answered with, when it did not do what one would expect.
     pub notice: Option<String>,
 }
@@ -42,7 +45,12 @@ impl Picks {
         picks
     }
 
-    /// A click on a surface. Without `add` it alone becomes the set that is being filled and the next click goes to the
+    /// Whether an entity can be intersected in a task: meshes and blocks only with others.
+    pub fn takes(task: Task, entity: &Entity) -> bool {
+        entity.surface().is_some() || task != Task::Itself && entity.facets().is_some()
+    }
+
+    /// A click on something. Without `add` it alone becomes the set that is being filled and the next click goes to the
     /// other set; with `add` (Shift) it joins the set, or leaves it when it is in.
     pub fn click(&mut self, id: EntityId, add: bool) {
         self.notice = None;
@@ -95,18 +103,22 @@ impl Picks {
     /// Forgets entities that are no longer in the document.
     pub fn prune(&mut self, document: &Document) {
         for side in &mut self.sides {
-            side.retain(|&id| document.get(id).is_some_and(|e| e.surface().is_some()));
+            side.retain(|&id| document.get(id).is_some_and(|e| Self::takes(self.task, e)));
         }
     }
 
     /// What goes in, or what is missing.
     pub fn chosen(&self, document: &Document) -> Result<[Vec<EntityId>; 2], &'static str> {
-        let visible = || document.entities().iter().filter(|e| e.visible && e.surface().is_some()).map(|e| e.id);
+        // On the exact surfaces meshes are left out of all pairs.
+        let counts = |e: &Entity| e.surface().is_some() || self.engine == Some(Engine::Mesh) && e.facets().is_some();
+        let visible = || document.entities().iter().filter(|e| e.visible && counts(e)).map(|e| e.id);
+        let is_mesh = |id: &EntityId| document.get(*id).is_some_and(|e| !Self::takes(Task::Itself, e));
         match self.task {
-            Task::Sets if self.sides[0].is_empty() => Err("pick a surface for the first set"),
-            Task::Sets if self.sides[1].is_empty() => Err("pick a surface for the second set"),
+            Task::Sets if self.sides[0].is_empty() => Err("pick a surface or mesh for the first set"),
+            Task::Sets if self.sides[1].is_empty() => Err("pick a surface or mesh for the second set"),
             Task::Sets => Ok(self.sides.clone()),
             Task::Pairs if visible().count() < 2 => Err("fewer than two surfaces are visible"),
+            Task::Itself if self.sides[0].iter().any(is_mesh) => Err("a mesh is not searched: pick surfaces only"),
             Task::Pairs => Ok([visible().collect(), Vec::new()]),
             Task::Itself if self.sides[0].is_empty() => Err("pick a surface, or search all visible ones"),
             Task::Itself => Ok([self.sides[0].clone(), Vec::new()]),
@@ -119,8 +131,8 @@ impl Picks {
             (Task::Pairs, ..) => "Intersect all pairs of the visible surfaces",
             (Task::Itself, true, _) => "Click a surface",
             (Task::Itself, false, _) => "Find where it meets itself",
-            (Task::Sets, true, _) => "Click a surface for the first set",
-            (Task::Sets, _, true) => "Click a surface for the second set",
+            (Task::Sets, true, _) => "Click a surface or mesh for the first set",
+            (Task::Sets, _, true) => "Click a surface or mesh for the second set",
             (Task::Sets, ..) => "Intersect the two sets",
         }
     }

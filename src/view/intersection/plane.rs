@@ -73,6 +73,7 @@ pub fn words(cut: &Cut) -> String {
         (SectionType::Hyperbolic, _, 0) if cut.offset == 0.0 => "an X through the point",
         (SectionType::Hyperbolic, _, 0) => "two branches that pass each other",
         (SectionType::Hyperbolic, ..) => "two branches that cross",
+        (SectionType::Parabolic, 0, 0) if !cut.section.complete => "a curve that counts twice",
         (SectionType::Parabolic, _, 0) if cut.offset == 0.0 => "a cusp",
         (SectionType::Parabolic, _, 0) => "one curve without a loop",
         (SectionType::Parabolic, ..) => "a loop with a tail",
@@ -111,6 +112,11 @@ mod tests {
         assert_eq!(see(0.0, 0.0), "Elliptic: the point alone");
         assert_eq!(see(70.0, 0.0), "Hyperbolic: an X through the point");
         assert!(see(70.0, 0.5).starts_with("Hyperbolic: two branches"));
+        let tilt =
+            cut(&found, Plane { miter: 0, tilt: 0.0, offset: 0.0 }, &Job::new()).unwrap().section.parabolic_tilts[1]
+                .to_degrees();
+        assert_eq!(see(tilt, 0.0), "Parabolic: a cusp");
+        assert_eq!(see(tilt, 0.1), "Parabolic: a loop with a tail");
     }
 
     #[test]
