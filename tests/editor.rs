@@ -343,12 +343,6 @@ fn a_click_selects_hiding_hides_and_undo_shows_again() {
     assert_eq!(visible(&window), 2);
 }
 
-fn hover(window: &mut Window, at: Pos2) {
-    window.event(Event::PointerMoved(at));
-    window.step();
-    settle(window);
-}
-
 #[test]
 fn the_uv_view_and_the_3d_view_share_one_cursor() {
     let mut window = opened("surfaces_with_gap.igs");

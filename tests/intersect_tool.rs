@@ -146,7 +146,7 @@ fn a_surface_without_self_intersection_is_proved_free() {
 fn esc_leaves_step_by_step_and_changes_nothing() {
     let mut window = opened("intersecting_surfaces.igs");
     key(&mut window, NONE, Key::X);
-    assert_eq!(prompt(&window), "Intersect · Click a surface for the first set");
+    assert_eq!(prompt(&window), "Intersect · Click a surface or mesh for the first set");
     key(&mut window, NONE, Key::Enter);
     assert!(prompt(&window).starts_with("Intersect"), "Enter says what is missing and stays");
     key(&mut window, NONE, Key::Escape);
@@ -165,9 +165,15 @@ fn a_plane_is_swept_through_the_miter_point_of_the_cross_cap() {
     window.get_by_label("Cut with a plane").click();
     settle(&mut window);
     assert!(window.query_by_label_contains("Elliptic: a figure-8").is_some());
+    picture(&mut window, "plane_elliptic");
     window.get_by_label("Through the point").click();
     settle(&mut window);
     assert!(window.query_by_label_contains("Elliptic: the point alone").is_some());
+    // Beyond the parabolic tilt the sections are hyperbolic.
+    window.get_all_by_label_contains("Parabolic at").next().unwrap().click();
+    settle(&mut window);
+    assert!(window.query_by_label_contains("Parabolic: a cusp").is_some());
+    picture(&mut window, "plane_parabolic");
 }
 
 /// Both preimages are in the uv view; the cursor's partners move with it.
@@ -195,4 +201,98 @@ fn the_uv_view_shows_both_domains() {
     settle(&mut window);
     let after = cursors(&window);
     assert!(before.iter().zip(&after).all(|(a, b)| a.distance(*b) > 1e-3), "{before:?} {after:?}");
+}
+
+/// (x, y^2, y^3 + (x^2 - 1/4) y): a loop of double points between two miter points.
+fn two_miters() -> Document {
+    let (line, square) = ([-1.0, 0.0, 1.0], [1.0, -1.0, 1.0]);
+    let y = [-1.0, -1.0 / 3.0, 1.0 / 3.0, 1.0];
+    let (y2, y3) = ([1.0, -1.0 / 3.0, -1.0 / 3.0, 1.0], [-1.0, 1.0, -1.0, 1.0]);
+    let at = |k: usize| {
+        let (i, j) = (k % 3, k / 3);
+        DVec3::new(line[i], y2[j], y3[j] + (square[i] - 0.25) * y[j])
+    };
+    let [u, v] = [2, 3].map(|degree| Knots::bezier(degree, -1.0, 1.0).unwrap());
+    let surface = Surface::new(u, v, (0..12).map(at).collect(), None).unwrap();
+    let mut document = Document::new(Unit::Metre);
+    document.add("two miters", Shape::Surface(Arc::new(surface)), None);
+    document
+}
+
+/// The levels of the ternary tree, its failed windows and converted leaves, in the Inspect tool.
+#[test]
+fn the_search_for_self_intersections_is_looked_into() {
+    let mut window = opened("surfaces_with_gap.igs");
+    window.state_mut().editor.show_document(two_miters(), None, "two miters".to_owned(), true);
+    settle(&mut window);
+    select(&mut window, &["two miters"]);
+    key(&mut window, NONE, Key::I);
+    window.get_by_label("Self-intersection search").click();
+    settle(&mut window);
+    assert!(window.query_by_label_contains("Complete: 1 curve, 2 miter points").is_some(), "{}", prompt(&window));
+    picture(&mut window, "ternary");
+    // The root is split: level 0 has one node, and the uv view says which level it shows.
+    key(&mut window, NONE, Key::Num0);
+    assert_eq!(prompt(&window), "Inspect · Level 0: hover a node in either view, click to pin it");
+    key(&mut window, NONE, Key::PageDown);
+    assert_eq!(prompt(&window), "Inspect · Level 1: hover a node in either view, click to pin it");
+    let pane = window.get_by_label_contains("uv view of two miters · self-intersection search, level 1").rect();
+    hover(&mut window, pane.center() + egui::vec2(3.0, 5.0));
+    assert!(window.query_by_label("Proved").is_some());
+    click(&mut window, pane.center() + egui::vec2(3.0, 5.0));
+    hover(&mut window, egui::pos2(4.0, 4.0));
+    assert!(window.query_by_label("Pinned node").is_some());
+    // A leaf is explained with its diagram, and both views go there.
+    window.get_by_label_contains("Miter point 1: R").click();
+    settle(&mut window);
+    assert!(window.query_by_label("Leaf conversion, not to scale").is_some());
+    key(&mut window, NONE, Key::W);
+    picture(&mut window, "ternary_leaf");
+    key(&mut window, NONE, Key::S);
+    assert!(prompt(&window).starts_with("Inspect · "), "{}", prompt(&window));
+    assert!(window.query_all_by_label("Height").next().is_some(), "S goes back to the hierarchy");
+}
+
+/// A bowl and a flat mesh: the triangles are intersected, the curve can be kept, and a mesh is not searched.
+#[test]
+fn a_mesh_is_intersected_with_a_surface() {
+    use patchwright::kernel::mesh::facets::Facets;
+    use patchwright::kernel::mesh::tri_mesh::TriMesh;
+    let mut document = walled_bowl();
+    document.retain(|e| e.name == "bowl");
+    let [x, y] = [DVec3::X, DVec3::Y].map(|d| d * 0.9);
+    let corners = [-x - y, x - y, x + y, y - x].map(|p| p + DVec3::Z * 0.05).to_vec();
+    let mesh = Facets::of_mesh(TriMesh::new(corners, vec![[0, 1, 2], [0, 2, 3]]).unwrap());
+    document.add("floor", Shape::Mesh(Arc::new(mesh)), None);
+    let mut window = opened("surfaces_with_gap.igs");
+    window.state_mut().editor.show_document(document, None, "bowl".to_owned(), true);
+    settle(&mut window);
+    select(&mut window, &["bowl", "floor"]);
+    key(&mut window, NONE, Key::X);
+    key(&mut window, NONE, Key::Enter);
+    assert!(window.query_by_label_contains("Complete on the triangles").is_some(), "{}", prompt(&window));
+    picture(&mut window, "mesh_and_surface");
+    key(&mut window, NONE, Key::N);
+    assert_eq!(prompt(&window), "Intersect · Curve 1 chosen");
+    key(&mut window, NONE, Key::K);
+    assert_eq!(window.state().editor.document().curves().count(), 1);
+    key(&mut window, NONE, Key::Escape);
+    key(&mut window, NONE, Key::Escape);
+    select(&mut window, &["floor"]);
+    key(&mut window, Modifiers::SHIFT, Key::X);
+    assert_eq!(prompt(&window), "Self-intersection · Click a surface");
+}
+
+/// Both engines' curves over one another, with what they are apart.
+#[test]
+fn the_result_on_triangles_is_laid_over_the_exact_one() {
+    let mut window = opened("intersecting_surfaces.igs");
+    select(&mut window, &["left panel", "right panel"]);
+    key(&mut window, NONE, Key::X);
+    key(&mut window, NONE, Key::Enter);
+    window.get_by_label("Lay the result on triangles over it").click();
+    settle(&mut window);
+    assert!(window.query_by_label_contains("On triangles: ").is_some());
+    assert!(window.query_by_label_contains("apart").is_some());
+    picture(&mut window, "both_engines");
 }

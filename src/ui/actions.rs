@@ -61,6 +61,7 @@ pub enum Action {
     MeasureTool,
     /// Stripes that show breaks of tangent and curvature.
     Zebra,
+    InspectSearch,
     IntersectTool,
     IntersectVisible,
     SelfIntersectTool,
@@ -313,6 +314,14 @@ pub const ACTIONS: &[Info] = &[
             key(NONE, Key::I),
             "Look into the bounding volumes and osculating tori of one or two surfaces, level by level",
         ),
+    ),
+    entry(
+        Action::InspectSearch,
+        View,
+        3,
+        "Inspect self-intersection search",
+        key(SHIFT, Key::I),
+        "Look at the ternary tree of a surface: what was proved, which windows failed, how leaves were converted",
     ),
     with(Icon::EyeOff, entry(Action::Hide, View, 4, "Hide", key(NONE, Key::H), "Hide what is selected")),
     with(Icon::Isolate, entry(Action::Isolate, View, 4, "Isolate", key(SHIFT, Key::H), "Hide everything else")),

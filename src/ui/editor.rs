@@ -12,7 +12,7 @@ use super::palette::Palette;
 use super::panels::defects::DefectSearch;
 use super::panels::uv::UvView;
 use super::settings::{Settings, Theme};
-use super::tools::{PickList, Tool};
+use super::tools::{Look, PickList, Tool};
 use super::viewport::Viewport;
 use crate::io::autosave::Recovery;
 use crate::model::command::Command;
@@ -195,11 +195,15 @@ impl Editor {
                 };
                 need(one.is_some_and(|e| matches!(e.shape, Shape::Patch(_))), "select one healed patch")
             }
-            Action::Inspect => need(
+            Action::Inspect | Action::InspectSearch => need(
                 self.document().entities().iter().any(|e| e.surface().is_some()),
                 "there is no surface to look into",
             ),
-            Action::IntersectTool | Action::SelfIntersectTool | Action::SearchSelfIntersections => {
+            Action::IntersectTool => need(
+                self.document().entities().iter().any(|e| e.surface().is_some() || e.facets().is_some()),
+                "there is neither a surface nor a mesh",
+            ),
+            Action::SelfIntersectTool | Action::SearchSelfIntersections => {
                 need(self.document().entities().iter().any(|e| e.surface().is_some()), "there is no surface")
             }
             Action::IntersectVisible => {
@@ -241,8 +245,9 @@ impl Editor {
             Action::UvView => self.settings.uv_view,
             Action::SelectTool => matches!(self.tool, Tool::Select),
             Action::PatchTool => matches!(self.tool, Tool::Patch(_)),
-            Action::Inspect => matches!(self.tool, Tool::Inspect(_)),
             Action::MeasureTool => matches!(self.tool, Tool::Measure(_)),
+            Action::Inspect => self.inspects() == Some(Look::Hierarchy),
+            Action::InspectSearch => self.inspects() == Some(Look::Search),
             Action::IntersectTool => self.intersect_task().is_some_and(|task| task != Task::Itself),
             Action::SelfIntersectTool => self.intersect_task() == Some(Task::Itself),
             _ => return None,
@@ -368,10 +373,12 @@ impl Editor {
             Action::SelectTool => self.leave_tool(),
             Action::PatchTool => self.start_patch(),
             Action::AdjustPatch => self.adjust_patch(),
-            Action::Inspect if matches!(self.tool, Tool::Inspect(_)) => self.leave_tool(),
-            Action::Inspect => self.start_inspect(),
             Action::MeasureTool if matches!(self.tool, Tool::Measure(_)) => self.leave_tool(),
             Action::MeasureTool => self.start_measure(),
+            Action::Inspect if self.inspects() == Some(Look::Hierarchy) => self.leave_tool(),
+            Action::InspectSearch if self.inspects() == Some(Look::Search) => self.leave_tool(),
+            Action::Inspect => self.start_inspect(Look::Hierarchy),
+            Action::InspectSearch => self.start_inspect(Look::Search),
             Action::IntersectTool => self.start_intersect(Task::Sets),
             Action::IntersectVisible => self.start_intersect(Task::Pairs),
             Action::SelfIntersectTool => self.start_intersect(Task::Itself),

@@ -57,6 +57,13 @@ pub fn key(window: &mut Window, modifiers: Modifiers, key: Key) {
     settle(window);
 }
 
+/// Moves the mouse somewhere.
+pub fn hover(window: &mut Window, at: Pos2) {
+    window.event(Event::PointerMoved(at));
+    window.step();
+    settle(window);
+}
+
 pub fn click(window: &mut Window, at: Pos2) {
     window.event(Event::PointerMoved(at));
     window.step();

@@ -140,6 +140,11 @@ struct Pen<'a> {
 }
 
 impl UvView {
+    /// Shows a box of parameters of a surface, low and high corner.
+    pub fn go_to(&mut self, entity: EntityId, domain: [[f64; 2]; 2], corners: [DVec2; 2]) {
+        self.navigation.insert(entity, UvNavigation::around(domain, corners));
+    }
+
     fn pane(&mut self, ui: &mut Ui, editor: &Editor, picture: &UvPicture, rect: Rect) {
         let response = ui.interact(rect, ui.scope_id().with(("uv", picture.entity.0)), Sense::click_and_drag());
         let name = format!("uv view of {}", picture.title);

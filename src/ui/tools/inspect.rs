@@ -1,5 +1,6 @@
-//! The Inspect tool: looking into the hierarchies of one or two selected surfaces. What it shows is made by workers from
-//! [`crate::view::inspect`]; this is what the window adds: jobs, the mouse, the keys.
+//! The Inspect tool: looking into the hierarchies of one or two selected surfaces, or into their search for
+//! self-intersections. What it shows is made by workers from [`crate::view::inspect`]; this is what the window adds: jobs,
+//! the mouse, the keys. What is about the search only is in `inspect_search`.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -9,15 +10,18 @@ use glam::DVec2;
 use super::super::editor::{Editor, Page};
 use super::super::linked::From;
 use super::super::panels::uv::UvPointer;
+use super::super::settings::Theme;
 use super::super::viewport::{Pointer, hit_entity};
 use super::Tool;
 use super::inspect_overlay::Dressed;
+use super::inspect_search::SearchView;
+use super::inspect_subject::{Polled, Subject};
 use crate::kernel::bvh::NodeId;
 use crate::kernel::geom::Surface;
 use crate::model::document::EntityId;
-use crate::view::inspect::{Coloring, Hierarchy, VolumeForm};
+use crate::view::inspect::{Coloring, Hierarchy, Searched, VolumeForm};
 use crate::view::uv::UvPicture;
-use crate::work::{Lane, Latest, Outcome, Ticket};
+use crate::work::Latest;
 
 /// The largest height that the panel offers.
 pub const MOST_HEIGHT: u32 = 9;
@@ -29,9 +33,19 @@ const LEAVES: usize = 1 << 16;
 const NODES: usize = 1000;
 
 /// A number that no other call returns: buffers and textures of one session must not pass for those of the next.
-fn fresh() -> u64 {
+pub fn fresh() -> u64 {
     static NEXT: AtomicU64 = AtomicU64::new(1);
     NEXT.fetch_add(1, Ordering::Relaxed)
+}
+
+/// What is looked at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Look {
+    /// The bounding volume hierarchies that intersections are found with.
+    #[default]
+    Hierarchy,
+    /// The search for self-intersections.
+    Search,
 }
 
 /// What is shown of the hierarchies.
@@ -51,21 +65,6 @@ pub struct Options {
     pub pairs: bool,
 }
 
-/// A surface that is looked into.
-pub struct Subject {
-    /// Which entity.
-    pub entity: EntityId,
-    /// Its name.
-    pub name: String,
-    /// Its surface.
-    pub surface: Arc<Surface>,
-    /// Its hierarchy, once it is built.
-    pub hierarchy: Option<Arc<Hierarchy>>,
-    /// Why there is none.
-    pub error: Option<String>,
-    building: Option<Ticket<Result<Hierarchy, String>>>,
-}
-
 /// A node of one of the subjects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Focus {
@@ -77,6 +76,10 @@ pub struct Focus {
 
 /// The tool at work.
 pub struct InspectSession {
+    /// What is looked at.
+    pub look: Look,
+    /// What is shown of the search for self-intersections.
+    pub search: SearchView,
     /// Levels below the Bezier patches that are built.
     pub height: u32,
     /// What is shown.
@@ -106,6 +109,8 @@ pub struct InspectSession {
 impl InspectSession {
     fn new() -> Self {
         Self {
+            look: Look::default(),
+            search: SearchView::default(),
             height: HEIGHT,
             options: Options {
                 level: 3,
@@ -134,14 +139,18 @@ impl InspectSession {
         self.hovered.or(self.pinned)
     }
 
-    /// Whether every subject has its hierarchy.
+    /// Whether every subject has what is looked at.
     pub fn is_built(&self) -> bool {
-        !self.subjects.is_empty() && self.subjects.iter().all(|s| s.hierarchy.is_some())
+        !self.subjects.is_empty()
+            && self.subjects.iter().all(|s| match self.look {
+                Look::Hierarchy => s.hierarchy.value().is_some(),
+                Look::Search => s.searched.value().is_some(),
+            })
     }
 
     /// Whether something is being computed for it.
     pub fn is_busy(&self) -> bool {
-        self.dressed.is_stale() || self.subjects.iter().any(|s| s.building.is_some())
+        self.dressed.is_stale() || self.search.dressed.is_stale() || self.subjects.iter().any(Subject::is_busy)
     }
 
     /// Changes the height; the hierarchies are built anew.
@@ -151,7 +160,7 @@ impl InspectSession {
             self.chosen = true;
             self.height = height;
             self.options.level = self.options.level.min(height);
-            self.forget();
+            self.forget_hierarchies();
         }
     }
 
@@ -175,18 +184,43 @@ impl InspectSession {
         let height = most(HEIGHT, LEAVES).max(1);
         if height != self.height {
             self.height = height;
-            self.forget();
+            self.forget_hierarchies();
         }
         self.options.level = most(height, NODES);
     }
 
-    /// Drops the hierarchies, so that they are built again.
-    pub fn forget(&mut self) {
-        for subject in &mut self.subjects {
-            subject.stop();
-            subject.hierarchy = None;
-            subject.error = None;
+    /// Looks at something else.
+    pub fn look_at(&mut self, look: Look) {
+        if look != self.look {
+            self.look = look;
+            (self.hovered, self.search.hovered) = (None, None);
+            self.moved = true;
+            self.revision += 1;
         }
+    }
+
+    /// The error of a subject, about what is looked at.
+    pub fn error_of<'a>(&self, subject: &'a Subject) -> Option<&'a str> {
+        match self.look {
+            Look::Hierarchy => subject.hierarchy.error(),
+            Look::Search => subject.searched.error(),
+        }
+    }
+
+    /// Drops what is looked at, so that it is made again.
+    pub fn forget(&mut self) {
+        match self.look {
+            Look::Hierarchy => self.forget_hierarchies(),
+            Look::Search => {
+                self.subjects.iter_mut().for_each(|s| s.searched.forget());
+                self.search.forget();
+            }
+        }
+        self.revision += 1;
+    }
+
+    fn forget_hierarchies(&mut self) {
+        self.subjects.iter_mut().for_each(|s| s.hierarchy.forget());
         (self.hovered, self.pinned) = (None, None);
         self.asked = None;
         self.revision += 1;
@@ -209,7 +243,7 @@ impl InspectSession {
 
     fn over(&self, entity: EntityId, uv: DVec2) -> Option<Focus> {
         let subject = self.subjects.iter().position(|s| s.entity == entity)?;
-        let tree = &self.subjects[subject].hierarchy.as_ref()?.tree;
+        let tree = &self.subjects[subject].hierarchy.value()?.tree;
         Some(Focus { subject, node: tree.node_over(self.options.level, uv) })
     }
 }
@@ -220,26 +254,18 @@ impl Drop for InspectSession {
     }
 }
 
-impl Drop for Subject {
-    fn drop(&mut self) {
-        self.stop();
-    }
-}
-
-impl Subject {
-    fn stop(&mut self) {
-        if let Some(ticket) = self.building.take() {
-            ticket.cancel();
-        }
-    }
-}
-
 impl Editor {
     /// Starts looking into what is selected.
-    pub fn start_inspect(&mut self) {
-        if matches!(self.tool, Tool::Inspect(_)) {
+    pub fn start_inspect(&mut self, look: Look) {
+        if let Tool::Inspect(session) = &mut self.tool {
+            session.look_at(look);
             self.show_page(Page::Tool);
             return;
+        }
+        if let Tool::Intersect(session) = &self.tool {
+            // What is being intersected is looked into.
+            let picked: Vec<EntityId> = session.picks.sides.iter().flatten().copied().take(2).collect();
+            self.selection.set(picked);
         }
         self.leave_tool();
         if self.selection.ids().iter().all(|&id| self.surface_of(id).is_none()) {
@@ -249,9 +275,19 @@ impl Editor {
                 self.selection.set([only]);
             }
         }
-        self.tool = Tool::Inspect(Box::new(InspectSession::new()));
+        let mut session = InspectSession::new();
+        session.look = look;
+        self.tool = Tool::Inspect(Box::new(session));
         self.settings.uv_view = true;
         self.show_page(Page::Tool);
+    }
+
+    /// What the Inspect tool looks at, while it is on.
+    pub fn inspects(&self) -> Option<Look> {
+        match &self.tool {
+            Tool::Inspect(session) => Some(session.look),
+            _ => None,
+        }
     }
 
     fn surface_of(&self, id: EntityId) -> Option<Arc<Surface>> {
@@ -260,11 +296,8 @@ impl Editor {
 
     /// Follows the selection, the workers and the options.
     pub fn poll_inspect(&mut self) {
-        let chosen: Vec<(EntityId, String, Arc<Surface>)> = {
-            let document = self.document();
-            let entities = self.selection.ids().iter().filter_map(|&id| document.get(id));
-            entities.filter_map(|e| Some((e.id, e.name.clone(), Arc::clone(e.surface()?)))).take(2).collect()
-        };
+        let chosen = self.chosen_surfaces();
+        let dark = self.settings.theme == Theme::Dark;
         let Tool::Inspect(session) = &mut self.tool else { return };
         let same = chosen.len() == session.subjects.len()
             && chosen
@@ -274,49 +307,58 @@ impl Editor {
         if !same {
             let mut old = std::mem::take(&mut session.subjects);
             for (entity, name, surface) in chosen {
-                // A hierarchy that is built stays as long as its surface is selected.
+                // What is made stays as long as its surface is selected.
                 let kept = old.iter().position(|o| o.entity == entity && Arc::ptr_eq(&o.surface, &surface));
                 session.subjects.push(match kept {
                     Some(at) => old.swap_remove(at),
-                    None => Subject { entity, name, surface, hierarchy: None, error: None, building: None },
+                    None => Subject::new(entity, name, surface),
                 });
             }
             // What is no longer looked into stops being built.
             drop(old);
             (session.hovered, session.pinned, session.asked) = (None, None, None);
+            session.search.forget();
             session.options.pairs &= session.subjects.len() == 2;
             session.fit();
             session.revision += 1;
         }
-        let height = session.height;
+        let (height, look) = (session.height, session.look);
         let mut died = None;
         for subject in &mut session.subjects {
-            if let Some(outcome) = subject.building.as_ref().and_then(Ticket::poll) {
-                subject.building = None;
-                match outcome {
-                    Outcome::Finished { cancelled: true, .. } | Outcome::NeverRan => {
-                        subject.error = Some("Building the hierarchy was cancelled".to_owned());
-                    }
-                    Outcome::Finished { value: Ok(hierarchy), .. } => subject.hierarchy = Some(Arc::new(hierarchy)),
-                    Outcome::Finished { value: Err(why), .. } => subject.error = Some(why),
-                    Outcome::Panicked { message, input } => {
-                        subject.error = Some(format!("Building the hierarchy failed: {message}"));
-                        died = Some((message, input));
-                    }
+            let (entity, surface) = (subject.entity, Arc::clone(&subject.surface));
+            match look {
+                Look::Hierarchy => {
+                    let input = format!("height {height}, entity {}", entity.0);
+                    let name = format!("Hierarchy of {}", subject.name);
+                    subject.hierarchy.want(&mut self.jobs, &name, input, move |job| {
+                        Hierarchy::build(entity, surface, height, job).map_err(|e| e.to_string())
+                    });
+                }
+                Look::Search => {
+                    let input = format!("entity {}", entity.0);
+                    let name = format!("Self-intersection search of {}", subject.name);
+                    let of = subject.name.clone();
+                    subject.searched.want(&mut self.jobs, &name, input, move |job| {
+                        Searched::search(entity, &of, &surface, job).map_err(|e| e.to_string())
+                    });
+                }
+            }
+            let polled = [
+                subject.hierarchy.poll("Building the hierarchy", false),
+                subject.searched.poll("The search for self-intersections", true),
+            ];
+            for (polled, what) in polled.into_iter().zip(["Building the hierarchy", "The self-intersection search"]) {
+                match polled {
+                    Polled::Same => continue,
+                    Polled::Changed => {}
+                    Polled::Died(message, input) => died = Some((what, message, input)),
                 }
                 session.revision += 1;
-            } else if subject.hierarchy.is_none() && subject.building.is_none() && subject.error.is_none() {
-                let (entity, surface) = (subject.entity, Arc::clone(&subject.surface));
-                let name = format!("Hierarchy of {}", subject.name);
-                let input = format!("height {height}, entity {}", entity.0);
-                subject.building = Some(self.jobs.spawn(Lane::Heavy, name, input, move |job| {
-                    Hierarchy::build(entity, surface, height, job).map_err(|e| e.to_string())
-                }));
             }
         }
-        session.dress(&mut self.jobs);
-        if let Some((message, input)) = died {
-            self.died("Building the hierarchy", &message, input);
+        session.dress(&mut self.jobs, dark);
+        if let Some((what, message, input)) = died {
+            self.died(what, &message, input);
         }
     }
 
@@ -337,26 +379,47 @@ impl Editor {
         ];
         let taken = |key| ctx.input_mut(|i| super::super::app::take_key(i, Modifiers::NONE, key));
         let Tool::Inspect(session) = &mut self.tool else { return };
-        for (level, key) in (0..).zip(DIGITS) {
+        let searching = session.look == Look::Search;
+        let mut level = if searching { session.search.options.level } else { session.options.level };
+        for (digit, key) in (0..).zip(DIGITS) {
             if taken(key) {
-                session.set_level(level);
+                level = digit;
             }
         }
-        if taken(Key::T) {
+        if taken(Key::PageUp) {
+            level = level.saturating_sub(1);
+        }
+        if taken(Key::PageDown) {
+            level += 1;
+        }
+        if searching {
+            session.set_search_level(level);
+        } else {
+            session.set_level(level);
+        }
+        if taken(Key::S) {
+            session.look_at(if searching { Look::Hierarchy } else { Look::Search });
+        }
+        if !searching && taken(Key::T) {
             session.options.tori ^= true;
         }
-        if taken(Key::V) {
+        if !searching && taken(Key::V) {
             let all = VolumeForm::ALL;
             let at = all.iter().position(|(form, _)| *form == session.options.form).unwrap_or(0);
             session.options.form = all[(at + 1) % all.len()].0;
         }
-        if taken(Key::G) {
+        if !searching && taken(Key::G) {
             session.options.ghosts ^= true;
         }
+        if searching && taken(Key::W) {
+            session.toggle_windows();
+        }
         if taken(Key::Escape) {
-            if session.subjects.iter().any(|s| s.building.is_some()) {
-                session.subjects.iter().filter_map(|s| s.building.as_ref()).for_each(Ticket::cancel);
-            } else if session.pinned.is_some() {
+            if session.subjects.iter().any(Subject::is_busy) {
+                session.subjects.iter().for_each(Subject::cancel);
+            } else if searching && session.search.pinned.is_some() {
+                session.pin_search(None);
+            } else if !searching && session.pinned.is_some() {
                 session.pin(None);
             } else {
                 self.leave_tool();
@@ -374,7 +437,11 @@ impl Editor {
         if pointer.pixel.is_some() && self.viewport.drag_anchor().is_some() {
             return;
         }
+        let searching = session.look == Look::Search;
+        let search_focus = linked.filter(|_| searching).and_then(|l| session.search_over(l.entity, l.uv));
+        session.hover_search(search_focus);
         let focus = match (&pointer.hover, ray) {
+            _ if searching => None,
             // Off the surface a volume that sticks out is met by its own form.
             (None, Some(ray)) => session.on_ray(&ray),
             _ => linked.and_then(|l| session.over(l.entity, l.uv)),
@@ -386,6 +453,7 @@ impl Editor {
         match clicked {
             Some(id) if held.shift || held.ctrl => self.selection.toggle(id),
             Some(id) if !known => self.selection.set([id]),
+            _ if searching => session.pin_search(search_focus),
             _ => session.pin(focus),
         }
     }
@@ -393,27 +461,41 @@ impl Editor {
     /// What the mouse does in the uv view: a click pins the node under it.
     pub fn inspect_uv_pointer(&mut self, pointer: Option<&UvPointer>) {
         let Tool::Inspect(session) = &mut self.tool else { return };
-        if let Some(pointer) = pointer.filter(|p| p.click.is_some()) {
-            let focus = session.over(pointer.entity, pointer.uv);
-            session.pin(focus);
+        let Some(pointer) = pointer.filter(|p| p.click.is_some()) else { return };
+        match session.look {
+            Look::Hierarchy => {
+                let focus = session.over(pointer.entity, pointer.uv);
+                session.pin(focus);
+            }
+            Look::Search => {
+                let focus = session.search_over(pointer.entity, pointer.uv);
+                session.pin_search(focus);
+            }
         }
     }
 
     /// The status line while the tool is on.
     pub fn inspect_prompt(&self) -> (String, String, String) {
         let Tool::Inspect(session) = &self.tool else { return Default::default() };
-        let keys = "0-9 level · V volumes · G ghosts · T tori · Shift+click second surface · Esc leave";
+        let searching = session.look == Look::Search;
+        let keys = if searching {
+            "0-9 PgUp PgDn level · W failed windows · S hierarchy · Shift+click second surface · Esc leave"
+        } else {
+            "0-9 PgUp PgDn level · V volumes · G ghosts · T tori · S search · Shift+click second surface · Esc leave"
+        };
+        let pinned = if searching { session.search.pinned.is_some() } else { session.pinned.is_some() };
+        let level = if searching { session.search.options.level } else { session.options.level };
         let prompt = if session.subjects.is_empty() {
-            "Click a surface to look into its hierarchy".to_owned()
-        } else if let Some(error) = session.subjects.iter().find_map(|s| s.error.as_ref()) {
-            error.clone()
+            "Click a surface to look into it".to_owned()
+        } else if let Some(error) = session.subjects.iter().find_map(|s| session.error_of(s)) {
+            error.to_owned()
         } else if !session.is_built() {
-            "Building the hierarchy".to_owned()
-        } else if session.pinned.is_some() {
+            if searching { "Searching for self-intersections" } else { "Building the hierarchy" }.to_owned()
+        } else if pinned {
             "A node is pinned; click it again or press Esc to let go".to_owned()
         } else {
             let from = if self.linked.is_some_and(|l| l.from == From::Domain) { "the uv view" } else { "either view" };
-            format!("Level {}: hover a node in {from}, click to pin it", session.options.level)
+            format!("Level {level}: hover a node in {from}, click to pin it")
         };
         ("Inspect".to_owned(), prompt, keys.to_owned())
     }
@@ -421,12 +503,15 @@ impl Editor {
 
 impl InspectSession {
     /// Asks a worker for what is to be drawn, when that has changed.
-    fn dress(&mut self, jobs: &mut crate::work::Jobs) {
-        if self.dressed.poll() {
+    fn dress(&mut self, jobs: &mut crate::work::Jobs, dark: bool) {
+        if self.dressed.poll() | self.search.dressed.poll() {
             self.revision += 1;
         }
-        if self.is_built() {
-            let trees: Vec<Arc<Hierarchy>> = self.subjects.iter().filter_map(|s| s.hierarchy.clone()).collect();
+        if self.look == Look::Search {
+            self.dress_search(jobs, dark);
+        } else if self.is_built() {
+            let trees: Vec<Arc<Hierarchy>> =
+                self.subjects.iter().filter_map(|s| s.hierarchy.value().cloned()).collect();
             let stamp = (trees.iter().map(|t| Arc::as_ptr(t) as usize).collect(), self.options);
             if self.asked.as_ref() != Some(&stamp) {
                 self.asked = Some(stamp);
@@ -443,7 +528,10 @@ impl InspectSession {
         }
         if self.pictured != self.revision {
             self.pictured = self.revision;
-            self.pictures = self.draw_pictures();
+            self.pictures = match self.look {
+                Look::Hierarchy => self.draw_pictures(),
+                Look::Search => self.search_pictures(),
+            };
         }
     }
 

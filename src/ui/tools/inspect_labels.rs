@@ -9,7 +9,7 @@ use super::super::status::{length, short};
 use super::super::theme::{self, Tokens};
 use super::super::viewport::{Pointer, tag};
 use super::Tool;
-use super::inspect::{Focus, InspectSession};
+use super::inspect::{Focus, InspectSession, Look};
 use super::inspect_overlay::{Dressed, PARTNERS};
 use crate::kernel::bvh::{NodeId, OsculatingTorus, SurfaceTree};
 use crate::model::document::Unit;
@@ -38,6 +38,10 @@ impl Editor {
         if std::mem::take(&mut session.moved) {
             // The panels and the uv view were drawn before the mouse was looked at.
             ui.ctx().request_repaint();
+        }
+        if session.look == Look::Search {
+            self.search_labels(ui, pointer);
+            return;
         }
         let painter = ui.painter().with_clip_rect(rect);
         let pen = Pen { painter, view: self.viewport.view(), corner: rect.min, t: theme::of(ui) };
@@ -78,7 +82,7 @@ pub fn torus_line(card: &NodeCard, unit: Unit) -> Option<String> {
 impl InspectSession {
     /// The tree of a subject.
     pub fn tree(&self, subject: usize) -> Option<&SurfaceTree> {
-        self.subjects.get(subject)?.hierarchy.as_ref().map(|h| &h.tree)
+        self.subjects.get(subject)?.hierarchy.value().map(|h| &h.tree)
     }
 }
 

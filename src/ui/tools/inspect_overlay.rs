@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use super::super::theme;
 use super::super::viewport::{Overlay, linear};
-use super::inspect::{Focus, InspectSession, Options};
+use super::inspect::{Focus, InspectSession, Look, Options};
+use super::inspect_subject::Subject;
 use crate::kernel::job::Job;
 use crate::model::document::EntityId;
 use crate::render::{Key, MeshItem, VolumeForm, VolumeItem, with_alpha};
@@ -178,6 +179,9 @@ fn title(name: &str, options: &Options) -> String {
 impl InspectSession {
     /// What is added to the picture.
     pub fn overlay(&self, dark: bool) -> Overlay {
+        if self.look == Look::Search {
+            return self.search_overlay();
+        }
         let mut overlay = Overlay { revision: self.revision, calm: true, ..Overlay::default() };
         let Some(dressed) = self.current() else { return overlay };
         overlay.volumes = dressed.volumes.clone();
@@ -188,7 +192,7 @@ impl InspectSession {
         }
         let focus = self.focus().filter(|_| self.whole_torus);
         let torus = focus.and_then(|f| {
-            let hierarchy = self.subjects.get(f.subject)?.hierarchy.as_ref()?;
+            let hierarchy = self.subjects.get(f.subject)?.hierarchy.value()?;
             Some((hierarchy.tree.torus(f.node)?, hierarchy))
         });
         if let Some((torus, hierarchy)) = torus {
@@ -203,12 +207,12 @@ impl InspectSession {
     /// The pictures of the uv view: the level in colour, the node in focus, its children, its partners.
     pub fn draw_pictures(&self) -> Vec<Arc<UvPicture>> {
         let Some(dressed) = self.current() else {
-            let plain = |s: &super::inspect::Subject| UvPicture::plain(s.entity, s.name.clone(), &s.surface);
+            let plain = |s: &Subject| UvPicture::plain(s.entity, s.name.clone(), &s.surface);
             return self.subjects.iter().map(|s| Arc::new(plain(s))).collect();
         };
         let mut pictures = dressed.pictures.clone();
         for focus in [self.pinned, self.hovered].into_iter().flatten() {
-            let tree = |k: usize| self.subjects.get(k).and_then(|s| s.hierarchy.as_ref()).map(|h| &h.tree);
+            let tree = |k: usize| self.subjects.get(k).and_then(|s| s.hierarchy.value()).map(|h| &h.tree);
             let (Some(own), Some(picture)) = (tree(focus.subject), pictures.get_mut(focus.subject)) else { continue };
             for child in children(own, focus.node) {
                 picture.marks.push(UvMark::rectangle(own.rectangle(child)).ink(UvInk::Text).width(1.0).fill(0.0));

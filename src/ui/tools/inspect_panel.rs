@@ -1,6 +1,6 @@
 //! The Tool page while the Inspect tool is on: what is shown, the numbers of the levels, the node in focus.
 
-use egui::{Checkbox, ComboBox, DragValue, Grid, ProgressBar, RichText, Slider, Ui, vec2};
+use egui::{Button, Checkbox, ComboBox, DragValue, Grid, ProgressBar, RichText, Slider, Ui, vec2};
 
 use super::super::actions::{self, Action};
 use super::super::editor::Editor;
@@ -8,8 +8,10 @@ use super::super::panels::{self, property};
 use super::super::status::{length, short};
 use super::super::theme;
 use super::Tool;
-use super::inspect::{InspectSession, MOST_HEIGHT, Subject};
+use super::inspect::{InspectSession, Look, MOST_HEIGHT};
 use super::inspect_overlay::{Dressed, PARTNERS};
+use super::inspect_subject::Subject;
+use crate::kernel::job::Job;
 use crate::model::document::Unit;
 use crate::render::BODIES;
 use crate::view::inspect::{Coloring, Hierarchy, MOST, NodeCard, VolumeForm};
@@ -25,8 +27,17 @@ fn bytes(n: usize) -> String {
     }
 }
 
-/// A count with thin groups of three digits.
-fn count(n: usize) -> String {
+/// Phase and percentage of a job.
+pub fn progress(job: &Job) -> String {
+    let percent = format!("{:.0} %", 100.0 * job.done());
+    match job.current_phase() {
+        phase if phase.is_empty() => percent,
+        phase => format!("{phase} · {percent}"),
+    }
+}
+
+/// A count with groups of three digits.
+pub fn count(n: usize) -> String {
     let digits = n.to_string();
     let mut out = String::new();
     for (k, c) in digits.chars().enumerate() {
@@ -49,26 +60,32 @@ impl Editor {
         let mut toggle_uv = false;
         let uv_view = self.settings.uv_view;
         let Tool::Inspect(session) = &mut self.tool else { return };
-        panels::heading(ui, "Inspect hierarchy");
-        let text = match session.subjects.len() {
-            0 => "Click a surface to see its bounding volumes level by level.",
-            1 => "Shift+click a second surface to see which nodes overlap.",
-            _ => "Two surfaces: their overlapping nodes can be shown.",
+        panels::heading(ui, "Inspect");
+        looks(ui, session);
+        let text = match (session.look, session.subjects.len()) {
+            (Look::Hierarchy, 0) => "Click a surface to see its bounding volumes level by level.",
+            (Look::Hierarchy, 1) => "Shift+click a second surface to see which nodes overlap.",
+            (Look::Hierarchy, _) => "Two surfaces: their overlapping nodes can be shown.",
+            (Look::Search, 0) => "Click a surface to see how it is searched for self-intersections.",
+            (Look::Search, _) => "The ternary tree: what was proved about each node against itself.",
         };
         ui.add(egui::Label::new(RichText::new(text).color(t.text[1])).wrap());
         ui.add_space(6.0);
+        if session.look == Look::Search {
+            self.search_panel(ui);
+            return;
+        }
         for subject in &session.subjects {
             ui.label(RichText::new(&subject.name).color(t.text[2]));
-            if let Some(error) = &subject.error {
+            if let Some(error) = subject.hierarchy.error() {
                 ui.add(egui::Label::new(RichText::new(error).color(t.bad)).wrap());
             }
         }
-        if session.subjects.iter().any(|s| s.error.is_some()) && ui.button("Build again").clicked() {
+        if session.subjects.iter().any(|s| s.hierarchy.error().is_some()) && ui.button("Build again").clicked() {
             session.forget();
         }
         if let Some(job) = active.iter().find(|job| job.name.starts_with("Hierarchy of")) {
-            let done = job.job.done() as f32;
-            ui.add(ProgressBar::new(done).text(format!("{} · {:.0} %", job.job.current_phase(), 100.0 * done)));
+            ui.add(ProgressBar::new(job.job.done() as f32).text(progress(&job.job)));
             cancel = ui.button("Cancel").on_hover_text("Stop building; what is built is dropped").clicked();
         }
         if session.subjects.is_empty() {
@@ -93,7 +110,7 @@ impl Editor {
         node(ui, session, unit);
         let mut level = session.options.level;
         for subject in &session.subjects {
-            if let Some(hierarchy) = &subject.hierarchy {
+            if let Some(hierarchy) = subject.hierarchy.value() {
                 ui.add_space(10.0);
                 levels(ui, subject, hierarchy, &mut level, unit);
             }
@@ -110,6 +127,25 @@ impl Editor {
     }
 }
 
+/// What is looked at.
+fn looks(ui: &mut Ui, session: &mut InspectSession) {
+    ui.horizontal(|ui| {
+        for (look, name, help) in [
+            (Look::Hierarchy, "Hierarchy", "The bounding volumes that intersections are found with (S)"),
+            (
+                Look::Search,
+                "Self-intersection search",
+                "The ternary tree, its failed windows, its converted leaves (S)",
+            ),
+        ] {
+            if ui.add(Button::selectable(session.look == look, name)).on_hover_text(help).clicked() {
+                session.look_at(look);
+            }
+        }
+    });
+    ui.add_space(4.0);
+}
+
 fn controls(ui: &mut Ui, session: &mut InspectSession) {
     let t = theme::of(ui);
     let quiet = |text: &str| RichText::new(text).color(t.text[1]);
@@ -118,7 +154,7 @@ fn controls(ui: &mut Ui, session: &mut InspectSession) {
         let mut level = session.options.level;
         ui.add(Slider::new(&mut level, 0..=session.height))
             .accessible_name("Level")
-            .on_hover_text("0 is the Bezier patches; each level quarters the nodes (digits 0-9)");
+            .on_hover_text("0 is the Bezier patches; each level quarters the nodes (digits 0-9, PgUp, PgDn)");
         session.set_level(level);
         ui.end_row();
         ui.label(quiet("Height"));

@@ -10,6 +10,7 @@ use super::Tool;
 use super::intersect_plane::PlaneDemo;
 use super::intersect_uv::UvShown;
 use crate::kernel::geom::Surface;
+use crate::kernel::intersect::Engine;
 use crate::kernel::ssi::{Tangency, tangency};
 use crate::model::command::Command;
 use crate::model::document::EntityId;
@@ -20,7 +21,8 @@ use crate::view::intersection::contact::{Contact, contact};
 use crate::view::intersection::gap::{FieldMesh, area_elements, gaps};
 use crate::view::intersection::keep::{self, Kept};
 use crate::view::intersection::marks::Focus;
-use crate::view::intersection::{Found, Item, OnCurve, Picks, Request, Task, compute, cursor};
+use crate::view::intersection::{Comparison, Found, Item, OnCurve, Picks, Request, Task, compute, cursor};
+use crate::view::uv::UvMark;
 use crate::work::{Lane, Latest, Outcome, Ticket};
 
 /// How near in pixels the cursor must be to something of the result.
@@ -38,6 +40,14 @@ pub enum FieldKind {
     Gap,
     /// |Su x Sv|.
     Area,
+}
+
+/// The engine that a result can be compared with.
+pub fn other_engine(engine: Engine) -> Engine {
+    match engine {
+        Engine::Bvh => Engine::Mesh,
+        Engine::Mesh => Engine::Bvh,
+    }
 }
 
 /// A result and how it was asked for.
@@ -75,6 +85,8 @@ pub struct IntersectSession {
     pub tangency: Option<Tangency>,
     /// The chosen curve as biarcs.
     pub biarcs: Latest<Result<Biarcs, String>>,
+    /// The other engine's result, laid over the one that is shown.
+    pub other: Latest<Result<Comparison, String>>,
     /// Curves that are being fitted to be kept.
     pub keeping: Option<Ticket<Kept>>,
     /// Chooses the first miter point as soon as it is found.
@@ -128,6 +140,7 @@ impl IntersectSession {
             tori: false,
             tangency: None,
             biarcs: Latest::default(),
+            other: Latest::default(),
             keeping: None,
             shows_miter: false,
             demo: PlaneDemo::default(),
@@ -217,6 +230,7 @@ impl IntersectSession {
         }
         self.focus = Focus::default();
         self.biarcs.clear();
+        self.other.clear();
         self.demo = PlaneDemo::default();
         self.put_cursor(None);
         self.changed();
@@ -231,6 +245,7 @@ impl IntersectSession {
         self.field = FieldKind::None;
         self.focus = Focus::default();
         self.biarcs.clear();
+        self.other.clear();
         self.demo = PlaneDemo::default();
         self.put_cursor(None);
         self.changed();
@@ -240,14 +255,14 @@ impl IntersectSession {
 impl Editor {
     /// Starts an intersection tool with what is selected.
     pub fn start_intersect(&mut self, task: Task) {
-        let surfaces: Vec<EntityId> = {
+        let bodies: Vec<EntityId> = {
             let document = self.document();
-            let is_surface = |id: &&EntityId| document.get(**id).is_some_and(|e| e.surface().is_some());
-            self.selection.ids().iter().filter(is_surface).copied().collect()
+            let takes = |id: &&EntityId| document.get(**id).is_some_and(|e| Picks::takes(task, e));
+            self.selection.ids().iter().filter(takes).copied().collect()
         };
         self.leave_tool();
         self.selection.clear();
-        self.tool = Tool::Intersect(Box::new(IntersectSession::new(task, &surfaces)));
+        self.tool = Tool::Intersect(Box::new(IntersectSession::new(task, &bodies)));
         self.show_page(Page::Tool);
         self.note = None;
         if task == Task::Pairs {
@@ -292,7 +307,7 @@ impl Editor {
     /// Takes over what the tool's workers have made.
     pub fn poll_intersect(&mut self) {
         let Tool::Intersect(session) = &mut self.tool else { return };
-        if session.shaded.poll() | session.demo.section.poll() | session.biarcs.poll() {
+        if session.shaded.poll() | session.demo.section.poll() | session.biarcs.poll() | session.other.poll() {
             session.changed();
         }
         if session.live.poll() {
@@ -391,6 +406,11 @@ impl Editor {
                 && session.running.is_none()
                 && let Some(id) = hit.as_ref().and_then(hit_entity)
             {
+                if !self.history.document().get(id).is_some_and(|e| Picks::takes(session.picks.task, e)) {
+                    let text = "A mesh has no parameters in which it could be searched for self-intersections";
+                    session.picks.notice = Some(text.to_owned());
+                    return;
+                }
                 session.picks.click(id, held.shift || held.ctrl);
                 session.error = None;
                 session.changed();
@@ -441,13 +461,17 @@ impl Editor {
         }
     }
 
-    /// Shows a miter point's ball as large as it is.
+    /// Shows a miter point's ball as large as it is, and its quadrangle in the uv view.
     pub fn zoom_to_true_scale(&mut self, miter: usize) {
         let Tool::Intersect(session) = &self.tool else { return };
         let Some(found) = &session.found else { return };
         if let Some(m) = found.result.miters.get(miter) {
             let bounds = crate::kernel::geom::Aabb { min: m.xyz, max: m.xyz }.grown(2.0 * m.radius);
             self.viewport.frame(&bounds);
+            if let (Some(entity), Some(surface)) = (found.id(m.a), found.surface(m.a)) {
+                let quad = UvMark::quad(m.quad).bounds();
+                self.uv.go_to(entity, surface.domain(), quad);
+            }
         }
     }
 
@@ -455,6 +479,10 @@ impl Editor {
     pub fn shade_intersect(&mut self, kind: FieldKind) {
         let Tool::Intersect(session) = &mut self.tool else { return };
         let Some(found) = session.found.clone() else { return };
+        if session.field != kind {
+            // |Su x Sv| matters down to a thousandth of its largest value, gaps much further.
+            session.decades = if kind == FieldKind::Area { 3 } else { 6 };
+        }
         session.field = kind;
         session.changed();
         if kind == FieldKind::None {
@@ -532,6 +560,25 @@ impl Editor {
             session.biarcs.clear();
         }
         session.changed();
+    }
+
+    /// Lays the other engine's result over the one that is shown, or takes it away.
+    pub fn lay_over(&mut self, on: bool) {
+        let Tool::Intersect(session) = &mut self.tool else { return };
+        let Some(found) = session.found.clone() else { return };
+        session.changed();
+        if !on {
+            session.other.clear();
+            return;
+        }
+        let request = match Request::new(&session.picks, self.history.document()) {
+            Ok(request) => Request { engine: Some(other_engine(found.engine)), ..request },
+            Err(missing) => return self.warn(format!("The other engine cannot run: {missing}")),
+        };
+        let (name, input) = (request.name(), request.to_string());
+        session.other.request(&mut self.jobs, &name, input, move |job| {
+            compute(&request, job).map(|other| Comparison::new(&found, other))
+        });
     }
 
     /// Whether there are curves to keep or to write.

@@ -12,6 +12,7 @@ use super::super::theme::{self, Tokens};
 use super::super::viewport::{Overlay, linear, tag};
 use super::Tool;
 use super::intersect::{Drawn, FieldKind, IntersectSession};
+use crate::kernel::ssi::result::Miter;
 use crate::render::{ColorScale, Dash, Field, GlyphData, GlyphShape, Hidden, LineStyle, Sketch, srgb, with_alpha};
 use crate::view::display::CurveRef;
 use crate::view::intersection::gap::LogScale;
@@ -47,6 +48,12 @@ impl IntersectSession {
                         d.polylines(hatch::region(found, k), style);
                     }
                     d.intersection(&Drawing::new(found, self.focus, dark), strength, dark);
+                    if let Some(Ok(both)) = self.other.value() {
+                        let color = with_alpha(linear(t.warn), strength);
+                        let style = LineStyle { width: 2.0, color, dash: Dash::SHORT, hidden: Hidden::OnTop };
+                        let curves = both.other.result.curves.iter();
+                        d.polylines(curves.map(|c| c.points.iter().map(|p| p.xyz)), style);
+                    }
                     self.biarc_joints(&mut d, t);
                     self.demo.draw(&mut d, t);
                 }
@@ -101,7 +108,9 @@ impl IntersectSession {
             }
             _ => {
                 let wide = ColorScale::sequential(0.0, 1.0);
-                let steps = (0..log.decades).map(|k| wide.color((k as f32 + 0.5) / n)).collect();
+                // Steps of a third of a power of ten, as far as the scale has room for them.
+                let count = (3 * log.decades).min(crate::render::MAX_STEPS);
+                let steps = (0..count).map(|k| wide.color((k as f32 + 0.5) / count as f32)).collect();
                 ColorScale { low: 0.0, high: n, steps, ..wide }
             }
         };
@@ -263,6 +272,7 @@ impl Editor {
         match session.focus.chosen.or(session.focus.hovered) {
             Some(item @ Item::Miter(k)) => {
                 if let (Some(at), Some(m)) = (item_at(item), found.result.miters.get(k)) {
+                    self.ball(&painter, t, m);
                     let text = format!("Miter point {} · ball of {}", k + 1, length(m.radius, unit));
                     tag(&painter, t, view, at + vec2(14.0, -26.0), &text, t.accent);
                 }
@@ -283,6 +293,25 @@ impl Editor {
         if let Some((kind, log, scale)) = session.color_scale() {
             bar(&painter, t, view, kind, &log, &scale, unit.symbol());
         }
+    }
+}
+
+impl Editor {
+    /// The ball of a miter point and the image of its quadrangle, where they are large enough to be seen.
+    fn ball(&self, painter: &Painter, t: &Tokens, miter: &Miter) {
+        /// Smaller than this the glyph hides them, in points.
+        const LEAST: f32 = 12.0;
+        let Some(center) = self.viewport.project(miter.xyz) else { return };
+        let seen = DVec3::AXES.into_iter().filter_map(|d| self.viewport.project(miter.xyz + d * miter.radius));
+        let radius = seen.map(|p| p.distance(center)).fold(0.0, f32::max);
+        let surface = self.found_intersection().and_then(|f| f.surface(miter.a).cloned());
+        let Some(surface) = surface.filter(|_| radius > LEAST) else { return };
+        painter.circle_stroke(center, radius, Pen::new(1.5, t.accent));
+        let corners = miter.quad.iter().chain(miter.quad.first());
+        let corners: Vec<_> = corners.copied().collect();
+        let along = corners.windows(2).flat_map(|e| (0..=8).map(move |i| e[0].lerp(e[1], f64::from(i) / 8.0)));
+        let line = along.filter_map(|uv| self.viewport.project(surface.eval(surface.clamped(uv)))).collect();
+        painter.line(line, Pen::new(2.0, t.accent));
     }
 }
 
@@ -313,7 +342,8 @@ fn power(value: f64) -> String {
 fn bar(painter: &Painter, t: &Tokens, view: Rect, kind: FieldKind, log: &LogScale, scale: &ColorScale, unit: &str) {
     let height = (view.height() * 0.42).clamp(140.0, 320.0);
     let bar = Rect::from_min_size(pos2(view.right() - 104.0, view.center().y - 0.5 * height), vec2(18.0, height));
-    let panel = Rect::from_min_max(bar.min - vec2(12.0, 36.0), bar.max + vec2(94.0, 40.0)).intersect(view.shrink(4.0));
+    let below = if kind == FieldKind::Gap { 40.0 } else { 14.0 };
+    let panel = Rect::from_min_max(bar.min - vec2(12.0, 36.0), bar.max + vec2(94.0, below)).intersect(view.shrink(4.0));
     painter.rect(panel, 6.0, t.label.gamma_multiply(0.92), Pen::new(1.0, t.border), StrokeKind::Inside);
     let small = FontId::proportional(theme::SMALL);
     let title = match (kind, unit) {
@@ -351,6 +381,9 @@ fn bar(painter: &Painter, t: &Tokens, view: Rect, kind: FieldKind, log: &LogScal
         painter.rect_filled(area, 0.0, egui::Color32::from_rgb(r, g, b));
         let text = format!("< {}", power(log.floor()));
         painter.text(pos2(bar.right() + 7.0, y_of(0.0)), Align2::LEFT_CENTER, text, small.clone(), t.text[1]);
+    }
+    if kind != FieldKind::Gap {
+        return;
     }
     let gap = Rect::from_min_size(pos2(bar.left(), bar.bottom() + 14.0), vec2(18.0, 10.0));
     let [r, g, b, _] = crate::render::to_srgb8(scale.no_data);

@@ -1,5 +1,7 @@
 //! The Tool page of the intersection tools: what goes in, progress, certificate, list, cursor, tangency inspector.
 
+use std::sync::Arc;
+
 use egui::{Align, Button, Grid, Layout, ProgressBar, RichText, ScrollArea, Sense, Slider, Ui, vec2};
 
 use super::super::actions::{self, Action};
@@ -11,10 +13,12 @@ use super::super::{panels, theme};
 use super::Tool;
 use super::intersect::{FieldKind, IntersectSession};
 use super::intersect_overlay::swatch;
+use crate::kernel::intersect::Engine;
+use crate::kernel::mesh::body::Body;
 use crate::model::document::{Document, EntityId, Unit};
 use crate::model::examples::coaxial;
 use crate::view::intersection::certificate::{Verdict, certificate};
-use crate::view::intersection::{Found, Item, OnCurve, Task, list};
+use crate::view::intersection::{Found, Item, OnCurve, Task, body_of, list};
 
 /// Rows of one group that are listed.
 const ROWS: usize = 200;
@@ -30,6 +34,7 @@ enum Ask {
     Leave,
     Turn(f64),
     Biarcs(bool),
+    LayOver(bool),
     Act(Action),
 }
 
@@ -78,6 +83,7 @@ impl Editor {
                 Ask::Leave => self.leave_tool(),
                 Ask::Turn(degrees) => self.turn_cylinder(degrees),
                 Ask::Biarcs(on) => self.fit_biarcs(on),
+                Ask::LayOver(on) => self.lay_over(on),
                 Ask::Act(action) => self.perform(&ctx, action),
             }
         }
@@ -129,8 +135,8 @@ fn notices(ui: &mut Ui, session: &IntersectSession, document: &Document) {
     let changed = session.found.as_ref().is_some_and(|found| {
         !session.is_stale()
             && found.numbers().iter().filter_map(|&n| found.subjects.get(n)).any(|s| {
-                let now = document.get(s.id).and_then(|e| e.surface());
-                now.is_none_or(|surface| !std::sync::Arc::ptr_eq(surface, &s.surface))
+                let now = document.get(s.id).and_then(|e| body_of(e));
+                now.is_none_or(|body| !same_body(&body, &s.body))
             })
     });
     let changed = changed.then_some("The model has changed since this was computed. Enter computes it again");
@@ -145,6 +151,16 @@ fn notices(ui: &mut Ui, session: &IntersectSession, document: &Document) {
             });
         });
         ui.add_space(4.0);
+    }
+}
+
+/// Whether two bodies are one and the same.
+fn same_body(a: &Body, b: &Body) -> bool {
+    match (a, b) {
+        (Body::Surface(a), Body::Surface(b)) => Arc::ptr_eq(a, b),
+        (Body::Face(a), Body::Face(b)) => Arc::ptr_eq(a, b),
+        (Body::Facets(a), Body::Facets(b)) => Arc::ptr_eq(a, b),
+        _ => false,
     }
 }
 
@@ -171,8 +187,8 @@ fn picking(ui: &mut Ui, session: &mut IntersectSession, document: &Document, ask
                     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                         let text = match ids.len() {
                             0 => "none yet".to_owned(),
-                            1 => "1 surface".to_owned(),
-                            n => format!("{n} surfaces"),
+                            1 => "1 picked".to_owned(),
+                            n => format!("{n} picked"),
                         };
                         ui.label(RichText::new(text).color(t.text[1]));
                     });
@@ -193,6 +209,7 @@ fn picking(ui: &mut Ui, session: &mut IntersectSession, document: &Document, ask
         }
         ui.add_space(4.0);
     }
+    engine(ui, session, document);
     let ready = session.picks.chosen(document);
     ui.add_space(4.0);
     ui.horizontal(|ui| {
@@ -224,6 +241,35 @@ fn picking(ui: &mut Ui, session: &mut IntersectSession, document: &Document, ask
         if ui.add(button).on_hover_text(info.help).clicked() {
             asks.push(Ask::Act(action));
         }
+    }
+}
+
+/// On what is computed.
+fn engine(ui: &mut Ui, session: &mut IntersectSession, document: &Document) {
+    if session.picks.task == Task::Itself {
+        return;
+    }
+    let t = theme::of(ui);
+    let is_mesh = |id: &EntityId| document.get(*id).is_some_and(|e| e.facets().is_some());
+    let meshes = session.picks.sides.iter().flatten().any(is_mesh);
+    let now = session.picks.engine.unwrap_or(if meshes { Engine::Mesh } else { Engine::Bvh });
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("On").color(t.text[1]));
+        for (engine, name, help) in [
+            (Engine::Bvh, "Exact surfaces", "With a proof that no branch is missing"),
+            (Engine::Mesh, "Triangles", "Surfaces are cut into triangles first, and the curves refined on them"),
+        ] {
+            let can = engine == Engine::Mesh || !meshes;
+            let button = Button::selectable(now == engine, name);
+            let shown = ui.add_enabled(can, button).on_hover_text(help);
+            if shown.on_disabled_hover_text("A mesh that was picked has no exact surface").clicked() {
+                session.picks.engine = Some(engine);
+            }
+        }
+    });
+    // What is chosen by hand holds until a mesh makes it impossible.
+    if meshes && session.picks.engine == Some(Engine::Bvh) {
+        session.picks.engine = None;
     }
 }
 
@@ -280,6 +326,9 @@ fn result(
         if ui.button("Again").on_hover_text("Enter").clicked() {
             asks.push(Ask::Run);
         }
+        if session.picks.task == Task::Itself && ui.button("Inspect the search").clicked() {
+            asks.push(Ask::Act(Action::InspectSearch));
+        }
         if ui.button("Other surfaces").on_hover_text("Backspace").clicked() {
             asks.push(Ask::Forget);
         }
@@ -288,6 +337,7 @@ fn result(
     rows(ui, session, found, &write, asks);
     cursor(ui, session, found, unit, gap_tol);
     biarcs(ui, session, unit, asks);
+    other_engine(ui, session, found, unit, asks);
     fields(ui, session, asks);
 }
 
@@ -298,7 +348,8 @@ fn rows(ui: &mut Ui, session: &IntersectSession, found: &Found, write: &dyn Fn(f
     if groups.is_empty() {
         return;
     }
-    let height = 300.0;
+    // What is below is about what is chosen here, and both should be seen at once.
+    let height = 232.0;
     egui::Frame::new().fill(t.field).corner_radius(5.0).inner_margin(6.0).show(ui, |ui| {
         ScrollArea::vertical().id_salt("found").max_height(height).auto_shrink([false, true]).show(ui, |ui| {
             for group in &groups {
@@ -430,6 +481,60 @@ fn biarcs(ui: &mut Ui, session: &IntersectSession, unit: Unit, asks: &mut Vec<As
         Some(Err(why)) => {
             ui.add(egui::Label::new(RichText::new(why).color(t.warn)).wrap());
         }
+        None => {}
+    }
+    ui.add_space(6.0);
+}
+
+/// The other engine's result over this one, on demand.
+fn other_engine(ui: &mut Ui, session: &IntersectSession, found: &Found, unit: Unit, asks: &mut Vec<Ask>) {
+    if found.with_itself {
+        return;
+    }
+    let t = theme::of(ui);
+    let mut on = session.other.value().is_some() || session.other.is_stale();
+    let (text, name) = match found.engine {
+        Engine::Bvh => ("Lay the result on triangles over it", "On triangles"),
+        Engine::Mesh => ("Lay the result on exact surfaces over it", "On exact surfaces"),
+    };
+    let used = session.picks.sides.iter().flatten().filter_map(|id| found.number(*id));
+    let meshes = found.engine == Engine::Mesh
+        && used.chain(found.numbers()).any(|n| found.subjects.get(n).is_some_and(|s| s.surface().is_none()));
+    ui.horizontal(|ui| {
+        let check = egui::Checkbox::new(&mut on, text);
+        let shown = ui.add_enabled(!meshes, check).on_hover_text("Both engines' curves at once: this one dashed");
+        if shown.on_disabled_hover_text("A mesh has no exact surface").changed() {
+            asks.push(Ask::LayOver(on));
+        }
+        if session.other.is_stale() {
+            ui.spinner();
+        }
+    });
+    let say = |ui: &mut Ui, text: String, color| {
+        ui.add(egui::Label::new(RichText::new(text).color(color).small()).wrap());
+    };
+    match session.other.value() {
+        Some(Ok(both)) => {
+            let (own, other) = (found.result.curves.len(), both.other.result.curves.len());
+            let many = |n: usize| if n == 1 { "1 curve".to_owned() } else { format!("{n} curves") };
+            let apart = match both.apart {
+                d if d.is_finite() => format!("at most {} apart", length(d, unit)),
+                _ => "only one has curves".to_owned(),
+            };
+            let lengths = both.lengths.map(|l| length(l, unit));
+            let text = format!(
+                "{name}: {}, {} long; here {}, {} long; {apart}",
+                many(other),
+                lengths[1],
+                many(own),
+                lengths[0]
+            );
+            say(ui, text, if own == other && both.apart.is_finite() { t.text[1] } else { t.warn });
+            if !both.other.result.complete {
+                say(ui, format!("{name} the result is not complete"), t.warn);
+            }
+        }
+        Some(Err(why)) => say(ui, why.clone(), t.warn),
         None => {}
     }
     ui.add_space(6.0);

@@ -9,9 +9,9 @@ use super::super::panels::uv::UvPointer;
 use super::Tool;
 use super::intersect::IntersectSession;
 use crate::view::intersection::cursor::nearest_uv;
-use crate::view::intersection::domains::{item_of, pictures};
+use crate::view::intersection::domains::{item_of, pictures, runs};
 use crate::view::intersection::{Found, Item, OnCurve};
-use crate::view::uv::{UvGlyph, UvInk, UvMark, UvPicture};
+use crate::view::uv::{UvDash, UvGlyph, UvInk, UvMark, UvPicture};
 
 /// The pictures and what they were made for: revisions of drawing and cursor, and the theme.
 pub type UvShown = ((u64, u64, bool), Vec<Arc<UvPicture>>);
@@ -30,6 +30,7 @@ impl IntersectSession {
         };
         self.demo.mark(self, &mut all);
         self.biarc_marks(&mut all);
+        self.other_marks(&mut all);
         self.uv = Some((of, all.into_iter().map(Arc::new).collect()));
     }
 
@@ -46,6 +47,22 @@ impl IntersectSession {
                 picture.marks.push(UvMark::polyline(arc.clone()).ink(ink).width(1.5));
                 if let Some(start) = arc.first() {
                     picture.marks.push(UvMark::point(*start, UvGlyph::Round).ink(ink).width(4.0));
+                }
+            }
+        }
+    }
+
+    /// The other engine's curves.
+    fn other_marks(&self, all: &mut [UvPicture]) {
+        let Some(Ok(both)) = self.other.value() else { return };
+        for picture in all {
+            let Some(number) = both.other.number(picture.entity) else { continue };
+            for curve in &both.other.result.curves {
+                for side in 0..2 {
+                    for run in runs(&both.other, &curve.points, number, side) {
+                        let line = UvMark::polyline(run).ink(UvInk::Warn).width(2.0).dash(UvDash::Short);
+                        picture.marks.push(line);
+                    }
                 }
             }
         }

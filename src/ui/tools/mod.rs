@@ -22,6 +22,10 @@ mod inspect;
 mod inspect_labels;
 mod inspect_overlay;
 mod inspect_panel;
+mod inspect_search;
+mod inspect_search_labels;
+mod inspect_search_panel;
+mod inspect_subject;
 mod intersect;
 mod intersect_overlay;
 mod intersect_panel;
@@ -35,6 +39,7 @@ mod patch_panel;
 mod select;
 
 use inspect::InspectSession;
+pub use inspect::Look;
 use intersect::IntersectSession;
 use measure::MeasureSession;
 use patch::PatchSession;
