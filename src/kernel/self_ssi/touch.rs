@@ -7,7 +7,8 @@
 //! is intersected as a whole, so that a curve of contact is one curve and the whole place is proved. Curves that cross in
 //! it must be known to the search.
 //!
-//! How it fails: where the sheets are tangent and cross as well the branches found on either side would have to be
+//! How it fails: along a curve of contact pairs of boxes that share only a point of it may stay open, because the search for
+//! the contact starts from their middles. Where the sheets are tangent and cross as well the branches found on either side would have to be
 //! joined with those of the search; such a place is listed as unresolved, once, with that reason.
 
 use glam::DVec2;
