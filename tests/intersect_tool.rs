@@ -296,3 +296,22 @@ fn the_result_on_triangles_is_laid_over_the_exact_one() {
     assert!(window.query_by_label_contains("apart").is_some());
     picture(&mut window, "both_engines");
 }
+
+#[test]
+fn a_click_in_the_outliner_fills_the_sets() {
+    let mut window = opened("surfaces_with_gap.igs");
+    window.state_mut().editor.show_document(walled_bowl(), None, "walled bowl".to_owned(), true);
+    settle(&mut window);
+    key(&mut window, NONE, Key::X);
+    for name in ["bowl", "wall 0"] {
+        window.get_by_label(name).click();
+        settle(&mut window);
+    }
+    assert!(prompt(&window).contains("Intersect the two sets"), "{}", prompt(&window));
+    key(&mut window, NONE, Key::Enter);
+    assert!(prompt(&window).contains("Click a curve or a point"), "{}", prompt(&window));
+    // With a result on screen the outliner selects again.
+    window.get_by_label("wall 1").click();
+    settle(&mut window);
+    assert_eq!(window.state().editor.selection.ids().len(), 1);
+}

@@ -184,8 +184,9 @@ impl Jobs {
         let (sender, receiver) = channel();
         let (records, wake, handle) = (Arc::clone(&self.records), Arc::clone(&self.wake), job.clone());
         let task: Task = Box::new(move || {
-            let outcome = run(&records, id, &handle, input, work);
-            let _nobody_waits_any_more = sender.send(outcome);
+            run(&records, id, &handle, input, work, |outcome| {
+                let _nobody_waits_any_more = sender.send(outcome);
+            });
             wake();
         });
         let queue = if lane == Lane::Heavy { &self.heavy } else { &self.preview };
@@ -225,10 +226,19 @@ impl Drop for Jobs {
     }
 }
 
-fn run<T>(records: &Records, id: JobId, job: &Job, input: String, work: impl FnOnce(&Job) -> T) -> Outcome<T> {
+/// Runs a job. Its outcome is handed on before the record says that it has ended: who sees the end finds the outcome.
+fn run<T>(
+    records: &Records,
+    id: JobId,
+    job: &Job,
+    input: String,
+    work: impl FnOnce(&Job) -> T,
+    hand_on: impl FnOnce(Outcome<T>),
+) {
     if job.is_cancelled() {
+        hand_on(Outcome::NeverRan);
         update(records, id, |r| r.state = State::Cancelled);
-        return Outcome::NeverRan;
+        return;
     }
     let start = Instant::now();
     update(records, id, |r| (r.state, r.started) = (State::Running, Some(start)));
@@ -242,8 +252,8 @@ fn run<T>(records: &Records, id: JobId, job: &Job, input: String, work: impl FnO
             (State::Panicked(message.clone()), Outcome::Panicked { message, input })
         }
     };
+    hand_on(outcome);
     update(records, id, |r| (r.state, r.took) = (state, Some(start.elapsed())));
-    outcome
 }
 
 fn update(records: &Records, id: JobId, change: impl FnOnce(&mut JobRecord)) {

@@ -130,6 +130,10 @@ fn row(ui: &mut Ui, editor: &mut Editor, entity: &Entity, shown: &[&std::sync::A
 /// A click selects, Ctrl adds or takes away, Shift selects the rows from the last one to this one.
 fn choose(ui: &Ui, editor: &mut Editor, id: EntityId, shown: &[&std::sync::Arc<Entity>]) {
     let held = ui.input(|i| i.modifiers);
+    // A tool that waits for surfaces takes them from here as from the view.
+    if editor.intersect_pick(id, held.shift || held.command) {
+        return;
+    }
     let place = |id: EntityId| shown.iter().position(|e| e.id == id);
     let last = editor.selection.ids().last().copied();
     match (held.shift, last.and_then(place), place(id)) {

@@ -397,23 +397,33 @@ impl Editor {
         }
     }
 
+    /// Picks an entity for the current set, in the view or in the outliner; false when nothing can be picked now.
+    pub fn intersect_pick(&mut self, id: EntityId, more: bool) -> bool {
+        let Tool::Intersect(session) = &mut self.tool else { return false };
+        let entity = self.history.document().get(id).filter(|e| e.curve().is_none());
+        let Some(entity) = entity.filter(|_| session.found.is_none() && session.running.is_none()) else {
+            return false;
+        };
+        if Picks::takes(session.picks.task, entity) {
+            session.picks.click(id, more);
+            session.error = None;
+        } else {
+            let text = "A mesh has no parameters in which it could be searched for self-intersections";
+            session.picks.notice = Some(text.to_owned());
+        }
+        session.changed();
+        true
+    }
+
     /// What the mouse did, for the tool.
     pub fn intersect_pointer(&mut self, pointer: &Pointer) {
         let view = self.viewport.view();
         let Tool::Intersect(session) = &mut self.tool else { return };
         let Some(found) = session.found.clone() else {
             if let Some((hit, held)) = &pointer.click
-                && session.running.is_none()
                 && let Some(id) = hit.as_ref().and_then(hit_entity)
             {
-                if !self.history.document().get(id).is_some_and(|e| Picks::takes(session.picks.task, e)) {
-                    let text = "A mesh has no parameters in which it could be searched for self-intersections";
-                    session.picks.notice = Some(text.to_owned());
-                    return;
-                }
-                session.picks.click(id, held.shift || held.ctrl);
-                session.error = None;
-                session.changed();
+                self.intersect_pick(id, held.shift || held.ctrl);
             }
             return;
         };

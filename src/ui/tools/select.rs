@@ -35,7 +35,9 @@ impl Editor {
         panels::heading(ui, "Next");
         let next = match (self.document().entities().is_empty(), self.selection.is_empty()) {
             (true, _) => &[Action::Open, Action::OpenExample][..],
-            (_, true) => &[Action::PatchTool, Action::IntersectTool, Action::Section, Action::FrameAll],
+            (_, true) => {
+                &[Action::PatchTool, Action::IntersectTool, Action::MeasureTool, Action::Section, Action::FrameAll]
+            }
             (_, false) => &[
                 Action::PatchTool,
                 Action::IntersectTool,
