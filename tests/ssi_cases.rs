@@ -37,23 +37,25 @@ fn check(name: &str) -> Vec<String> {
     faults
 }
 
-#[test]
-fn all() {
-    let Some(folder) = cases::folder() else { return };
+/// The names of all public cases of this kind.
+fn names() -> Vec<String> {
+    let Some(folder) = cases::folder() else { return Vec::new() };
     let mut names: Vec<String> = std::fs::read_dir(folder)
         .unwrap()
         .filter_map(|e| e.unwrap().file_name().to_str().and_then(|n| n.strip_suffix(".igs").map(str::to_owned)))
+        .filter(|name| {
+            let problem = Case::load(name).map(|case| case.document["problem"].as_str().unwrap_or("").to_owned());
+            problem.is_some_and(|p| ["ssi", "overlap"].contains(&p.as_str()))
+        })
         .collect();
     names.sort();
+    names
+}
+
+#[test]
+fn all() {
     let only = std::env::var("CASE").unwrap_or_default();
-    let mut bad = 0;
-    for name in names {
-        let Some(case) = Case::load(&name) else { continue };
-        let problem = case.document["problem"].as_str().unwrap_or("");
-        if ["ssi", "overlap"].contains(&problem) && name.contains(&only) {
-            bad += usize::from(!check(&name).is_empty());
-        }
-    }
+    let bad = names().iter().filter(|name| name.contains(&only) && !check(name).is_empty()).count();
     assert_eq!(bad, 0);
 }
 
@@ -121,6 +123,66 @@ fn topology(result: &Intersection) -> Topology {
     (curves, junctions, result.regions.len(), result.complete)
 }
 
+/// Cases whose deciding separation drowns in the rounding of the coordinates 1e4 diagonals away: contacts, and gaps under
+/// 1e-9 of the diagonal.
+fn drowns_far_away(case: &Case) -> bool {
+    let oracle = case.oracle();
+    let some = |key: &str| oracle[key].as_array().is_some_and(|list| !list.is_empty());
+    let small = ["almost_overlap", "sphere_sphere_gap1e", "torus_plane_e", "saddle_miss_-1e-07", "overlap"];
+    some("junctions")
+        || some("isolated")
+        || oracle["below_tol"] == true
+        || small.iter().any(|s| case.name.starts_with(s))
+}
+
+/// How many curves, contacts and regions do not depend on place, size, order and parametrization; the faults.
+fn variants(name: &str) -> Vec<String> {
+    let Some(case) = Case::load(name) else { return Vec::new() };
+    let n_a = case.n_a();
+    let run = |surfaces: &[Surface], n_a: usize| {
+        let all: Vec<(usize, &Surface)> = surfaces.iter().enumerate().collect();
+        let (a, b) = all.split_at(n_a);
+        topology(&intersect(a, b, &SsiOptions::default(), &Job::new()).unwrap())
+    };
+    let every = |change: &dyn Fn(&Surface) -> Surface| case.surfaces.iter().map(change).collect::<Vec<_>>();
+    let wanted = run(&case.surfaces, n_a);
+    let diagonal = case.surfaces.iter().fold(Aabb::EMPTY, |b, s| b.union(&s.bounds())).diagonal();
+    let mut list: Vec<(&str, Vec<Surface>, usize)> = vec![
+        ("smaller", every(&|s| s.transformed(&DAffine3::from_scale(DVec3::splat(1e-3)))), n_a),
+        ("larger", every(&|s| s.transformed(&DAffine3::from_scale(DVec3::splat(1e3)))), n_a),
+        (
+            "operands swapped",
+            case.surfaces[n_a..].iter().chain(&case.surfaces[..n_a]).cloned().collect(),
+            case.surfaces.len() - n_a,
+        ),
+        ("u and v swapped", every(&Surface::swapped), n_a),
+        ("u reversed", every(&|s| s.reversed(Direction::U)), n_a),
+        ("v reversed", every(&|s| s.reversed(Direction::V)), n_a),
+        ("u elevated", every(&|s| s.elevated(Direction::U).unwrap()), n_a),
+        ("v elevated", every(&|s| s.elevated(Direction::V).unwrap()), n_a),
+    ];
+    if !drowns_far_away(&case) {
+        let far = DAffine3::from_translation(DVec3::new(0.6, -0.5, 0.62) * 1e4 * diagonal);
+        list.push(("far away", every(&|s| s.transformed(&far)), n_a));
+    }
+    // Each surface of the first side in two.
+    let mut split = Vec::new();
+    for s in &case.surfaces[..n_a] {
+        let [u, v] = s.domain();
+        let middle = u[0] + 0.4375 * (u[1] - u[0]);
+        split.push(s.restricted([u[0], middle], v).unwrap());
+        split.push(s.restricted([middle, u[1]], v).unwrap());
+    }
+    let count = split.len();
+    split.extend(case.surfaces[n_a..].iter().cloned());
+    list.push(("split into patches", split, count));
+    let judged = |(what, surfaces, n_a): (&str, Vec<Surface>, usize)| {
+        let got = run(&surfaces, n_a);
+        (got != wanted).then(|| format!("{name}, {what}: {got:?}, not {wanted:?}"))
+    };
+    list.into_iter().filter_map(judged).collect()
+}
+
 #[test]
 fn topology_does_not_depend_on_how_the_surfaces_are_written() {
     let names = [
@@ -130,54 +192,21 @@ fn topology_does_not_depend_on_how_the_surfaces_are_written() {
         "torus_plane_fig8",
         "cyl_bez_0.1deg",
         "graph_1x1_loop_r0.001",
+        // Split, a junction lies near a border: it once lost the arms beyond.
+        "villarceau",
+        // Exchanged, a loop starts where borders of both sides cross: it was once followed round and round.
+        "graph_8x8_s21_tiny0.01",
     ];
-    for name in names {
-        let Some(case) = Case::load(name) else { return };
-        let n_a = case.n_a();
-        let run = |surfaces: &[Surface], n_a: usize| {
-            let all: Vec<(usize, &Surface)> = surfaces.iter().enumerate().collect();
-            let (a, b) = all.split_at(n_a);
-            topology(&intersect(a, b, &SsiOptions::default(), &Job::new()).unwrap())
-        };
-        let every = |change: &dyn Fn(&Surface) -> Surface| case.surfaces.iter().map(change).collect::<Vec<_>>();
-        let wanted = run(&case.surfaces, n_a);
-        let diagonal = case.surfaces.iter().fold(Aabb::EMPTY, |b, s| b.union(&s.bounds())).diagonal();
-        let variants: Vec<(&str, Vec<Surface>, usize)> = vec![
-            ("smaller", every(&|s| s.transformed(&DAffine3::from_scale(DVec3::splat(1e-3)))), n_a),
-            ("larger", every(&|s| s.transformed(&DAffine3::from_scale(DVec3::splat(1e3)))), n_a),
-            (
-                "far away",
-                every(&|s| s.transformed(&DAffine3::from_translation(DVec3::new(0.6, -0.5, 0.62) * 1e4 * diagonal))),
-                n_a,
-            ),
-            (
-                "operands swapped",
-                case.surfaces[n_a..].iter().chain(&case.surfaces[..n_a]).cloned().collect(),
-                case.surfaces.len() - n_a,
-            ),
-            ("u and v swapped", every(&Surface::swapped), n_a),
-            ("reversed", every(&|s| s.reversed(Direction::U)), n_a),
-            ("elevated", every(&|s| s.elevated(Direction::V).unwrap()), n_a),
-        ];
-        for (what, surfaces, n_a) in variants {
-            // So far away the deciding separation of these drowns in the rounding of the coordinates.
-            let drowned = what == "far away" && ["saddle_touch", "torus_plane_fig8", "cyl_bez_0.1deg"].contains(&name);
-            if !drowned {
-                assert_eq!(run(&surfaces, n_a), wanted, "{name}, {what}");
-            }
-        }
-        // Split each surface of the first side in the middle of u.
-        let mut split = Vec::new();
-        for s in &case.surfaces[..n_a] {
-            let [u, v] = s.domain();
-            let middle = u[0] + 0.4375 * (u[1] - u[0]);
-            split.push(s.restricted([u[0], middle], v).unwrap());
-            split.push(s.restricted([middle, u[1]], v).unwrap());
-        }
-        let count = split.len();
-        split.extend(case.surfaces[n_a..].iter().cloned());
-        assert_eq!(run(&split, count), wanted, "{name}, split into patches");
-    }
+    let faults: Vec<String> = names.into_iter().flat_map(variants).collect();
+    assert!(faults.is_empty(), "{faults:#?}");
+}
+
+#[test]
+#[ignore = "the same for all public cases"]
+fn topology_of_no_case_depends_on_how_the_surfaces_are_written() {
+    let faults: Vec<String> = names().iter().flat_map(|name| variants(name)).collect();
+    println!("{faults:#?}");
+    assert!(faults.is_empty(), "{} faults", faults.len());
 }
 
 #[test]

@@ -12,6 +12,8 @@
 //! cell without an unknown critical point each arc of the zero set ends on the cell's border or circles the one
 //! extremum, so the roots on the border, and one ray from the extremum, are seeds of everything.
 
+use std::sync::LazyLock;
+
 use glam::{DVec2, DVec3};
 
 use super::bernstein::{Poly2, chebyshev_node, roots};
@@ -21,11 +23,13 @@ use super::tree::Node;
 
 /// The degree of the fit in each variable.
 const DEGREE: usize = 8;
+/// How far the last coefficient along a line may exceed the error allowed (that of the cell may be larger).
+const ROUGH: f64 = 30.0;
 /// Rounding of g in the unit frame.
 pub const ROUNDING: f64 = 2e-15;
 /// Cells smaller than this fraction of the fitted one are given up.
 const SMALLEST: f64 = 1.0 / 16384.0;
-/// Down to this fraction of the fitted one coincident cells are split where they lie across a border of the other piece.
+/// Down to this fraction of the fitted one coincident cells are split whose middle and corners lie off the other piece.
 const ACROSS: f64 = 1.0 / 32.0;
 /// How often a cell is halved to tell apart where the zero set crosses a border of the other piece.
 const RIM_DEPTH: usize = 12;
@@ -170,24 +174,31 @@ pub fn fit(a: &Piece, node: &Node, b: &Piece, other: &Node) -> Option<Contact> {
     const M: usize = DEGREE / 2;
     let mut g = vec![0.0; W * W];
     let mut feet = [[DVec2::ZERO; W]; W];
+    // The middle column and the middle row first: where they need a higher degree, so does the rest.
     for j in (0..=M).rev().chain(M + 1..W) {
-        let inner_row = if j > M { j.wrapping_sub(1) } else { j + 1 };
-        for i in (0..=M).rev().chain(M + 1..W) {
-            let start = if i == M {
-                match j.abs_diff(M) {
-                    0 => center,
-                    1 if j < M => feet[M][M],
-                    _ => extrapolated(&nodes, j, |j| feet[j][M]),
-                }
-            } else if i.abs_diff(M) + usize::from(i > M) * M > 2 {
-                extrapolated(&nodes, i, |i| feet[j][i])
+        let start = match j.abs_diff(M) {
+            0 => center,
+            1 if j < M => feet[M][M],
+            _ => extrapolated(j, |j| feet[j][M]),
+        };
+        (g[j * W + M], feet[j][M]) = sample(0.5, nodes[j], start)?;
+    }
+    if rough(|j| g[j * W + M]) {
+        return None;
+    }
+    for j in [M].into_iter().chain((0..M).rev()).chain(M + 1..W) {
+        let inner_row = if j > M { j - 1 } else { j + 1 };
+        for i in (0..M).rev().chain(M + 1..W) {
+            let start = if i > M || i + 2 < M {
+                extrapolated(i, |i| feet[j][i])
             } else {
-                let inner = if i > M { i - 1 } else { i + 1 };
-                let step = if j == M { DVec2::ZERO } else { feet[inner_row][i] - feet[inner_row][inner] };
-                feet[j][inner] + step
+                let step = if j == M { DVec2::ZERO } else { feet[inner_row][i] - feet[inner_row][i + 1] };
+                feet[j][i + 1] + step
             };
-            let (gap, st) = sample(nodes[i], nodes[j], start)?;
-            (g[j * W + i], feet[j][i]) = (gap, st);
+            (g[j * W + i], feet[j][i]) = sample(nodes[i], nodes[j], start)?;
+        }
+        if j == M && rough(|i| g[M * W + i]) {
+            return None;
         }
     }
     let g = Poly2::fit(DEGREE, &g);
@@ -210,20 +221,49 @@ pub fn fit(a: &Piece, node: &Node, b: &Piece, other: &Node) -> Option<Contact> {
     Some(Contact { pa: node.piece, pb: other.piece, low: node.low, high: node.high, g, s, t, error, feet })
 }
 
-/// The foot at node `i` of the Chebyshev nodes, from up to four nodes further inwards that are known (the middle one
-/// and those between, and beyond the middle where `i` lies in the second half).
-fn extrapolated(nodes: &[f64; DEGREE + 1], i: usize, known: impl Fn(usize) -> DVec2) -> DVec2 {
-    let middle = DEGREE / 2;
-    let inner = |k: usize| if i < middle { i + k } else { i - k };
-    let count = if i < middle { middle - i } else { i }.min(4);
-    let mut out = DVec2::ZERO;
-    for k in 1..=count {
-        let others = (1..=count).filter(|&l| l != k);
-        let weight =
-            others.map(|l| (nodes[i] - nodes[inner(l)]) / (nodes[inner(k)] - nodes[inner(l)])).product::<f64>();
-        out += known(inner(k)) * weight;
+/// Whether values at the nodes of a line are so far from a polynomial that a fit over the whole cell would fail too:
+/// their last Chebyshev coefficient against what an error may be.
+fn rough(value: impl Fn(usize) -> f64) -> bool {
+    let (mut last, mut most) = (0.0, 0.0);
+    for i in 0..=DEGREE {
+        let share = if i == 0 || i == DEGREE { 0.5 } else { 1.0 } / DEGREE as f64;
+        last += if i % 2 == 0 { share * value(i) } else { -share * value(i) };
+        most = f64::max(most, value(i).abs());
     }
-    out
+    last.abs() > ROUGH * (1e-5 * most).max(8.0 * ROUNDING)
+}
+
+/// The foot at node `i` of the Chebyshev nodes, extrapolated from up to four nodes further inwards (the middle one and
+/// those between; in the second half those beyond the middle too).
+fn extrapolated(i: usize, known: impl Fn(usize) -> DVec2) -> DVec2 {
+    static WEIGHTS: LazyLock<[[f64; 4]; DEGREE + 1]> = LazyLock::new(|| {
+        std::array::from_fn(|i| {
+            let at = |k: usize| at_node(inner(i, k));
+            let count = inner_count(i);
+            std::array::from_fn(|k| {
+                if k >= count {
+                    return 0.0;
+                }
+                let others = (0..count).filter(|&l| l != k);
+                others.map(|l| (at_node(i) - at(l)) / (at(k) - at(l))).product()
+            })
+        })
+    });
+    (0..inner_count(i)).map(|k| known(inner(i, k)) * WEIGHTS[i][k]).sum()
+}
+
+fn at_node(i: usize) -> f64 {
+    chebyshev_node(DEGREE, i)
+}
+
+/// The node `k` + 1 steps inwards of node `i`.
+fn inner(i: usize, k: usize) -> usize {
+    if i < DEGREE / 2 { i + k + 1 } else { i - k - 1 }
+}
+
+/// How many nodes further inwards are used.
+fn inner_count(i: usize) -> usize {
+    if i < DEGREE / 2 { DEGREE / 2 - i } else { i }.min(4)
 }
 
 /// A cell during the analysis.
@@ -257,12 +297,6 @@ impl Affine {
         }
         let h = p.hessian_range().map(|r| r[0].abs().max(r[1].abs()));
         Self { c, d, r, h }
-    }
-
-    /// Whether the values over a rectangle surely lie in [0, 1], or hardly outside.
-    fn inside(&self, low: DVec2, size: DVec2) -> bool {
-        let (middle, half) = (self.c + self.d.dot(low + 0.5 * size), 0.5 * self.d.abs().dot(size) + self.r);
-        middle - half >= -1e-6 && middle + half <= 1.0 + 1e-6
     }
 
     /// Whether the values over a rectangle lie outside [0, 1] or only touch its ends: what lies on a border belongs
@@ -309,6 +343,10 @@ impl Contact {
     /// Analyses the zero set. `contact` is the gap that counts as none. False when the cells ran out: then only a
     /// finer fit helps, and `out` is as it was.
     pub fn analyse(&self, contact: f64, out: &mut Findings) -> bool {
+        let [min, max] = self.g.range();
+        if min > contact + self.error || max < -contact - self.error {
+            return true;
+        }
         let mut found = Findings::default();
         let (s, t) = (Affine::of(&self.s), Affine::of(&self.t));
         let mut stack = vec![Sub { g: self.g.clone(), low: DVec2::ZERO, size: DVec2::ONE }];
@@ -355,9 +393,13 @@ impl Contact {
                 if self.error > (0.5 * contact).max(8.0 * ROUNDING) {
                     return false;
                 }
-                // Of a cell across the border only the part on this side counts.
-                let inside = |feet: &Affine| feet.inside(sub.low, sub.size);
-                if size < ACROSS || (inside(&s) && inside(&t)) {
+                // Of a cell across the border only the part on this side counts, if there is any.
+                let inside = |x: f64| (1e-6..=1.0 - 1e-6).contains(&x);
+                let reaches = [(0.5, 0.5), (0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)].iter().any(|&(x, y)| {
+                    let at = sub.low + sub.size * DVec2::new(x, y);
+                    inside(self.s.value(at.x, at.y)) && inside(self.t.value(at.x, at.y))
+                });
+                if size < ACROSS || reaches {
                     found.coincident.push(self.cell(&sub));
                     continue;
                 }
@@ -428,6 +470,14 @@ impl Contact {
     fn rim_seeds(&self, sub: &Sub, feet: [&Affine; 2], found: &mut Findings) {
         for (affine, poly) in feet.into_iter().zip([&self.s, &self.t]) {
             for bound in [0.0, 1.0] {
+                // Most cells lie clear of the border.
+                let clear = |low: DVec2, size: DVec2| {
+                    let reach = 0.5 * affine.d.abs().dot(size) + affine.r;
+                    (affine.c + affine.d.dot(low + 0.5 * size) - bound).abs() > reach
+                };
+                if clear(sub.low, sub.size) {
+                    continue;
+                }
                 let mut stack = vec![(sub.g.clone(), sub.low, sub.size, 0)];
                 while let Some((g, low, size, depth)) = stack.pop() {
                     let [min, max] = g.range();
@@ -435,8 +485,7 @@ impl Contact {
                         continue;
                     }
                     let at = low + 0.5 * size;
-                    let reach = 0.5 * affine.d.abs().dot(size) + affine.r;
-                    if (affine.c + affine.d.dot(at) - bound).abs() > reach {
+                    if clear(low, size) {
                         continue;
                     }
                     let v = poly.eval(at.x, at.y);

@@ -121,14 +121,20 @@ pub fn correct(
         if residual <= floor && (length <= 1e-13 || (off <= 1e-12 && length >= 0.5 * last)) {
             return Some(Corrected { at, a: ja, b: jb, residual });
         }
+        let turn = step.iter().fold(0.0, |m: f64, s| m.max(s.abs()));
         for (value, step) in x.iter_mut().zip(step) {
             *value += step;
+        }
+        // A step at the level of rounding is as good as linear: nothing is evaluated once more for it.
+        if length < 1e-12 && turn < 1e-11 && residual < 1e-9 && length <= 0.5 * last {
+            let a = Jet1 { p: ja.p + ja.u * step[0] + ja.v * step[1], ..ja };
+            let b = Jet1 { p: jb.p + jb.u * step[2] + jb.v * step[3], ..jb };
+            return Some(Corrected { at: PointPair::from_array(x), a, b, residual: a.p.distance(b.p) });
         }
         if x.iter().any(|v| !(v.abs() < 1e8)) {
             return None;
         }
         // One step after a small one is as good as Newton gets; near a pole small in space is not small in parameters.
-        let turn = step.iter().fold(0.0, |m: f64, s| m.max(s.abs()));
         if length < 1e-9 && residual < 1e-9 && length <= 0.5 * last {
             polished = turn < 1e-9;
             good = Some(Corrected { at, a: ja, b: jb, residual });

@@ -59,6 +59,10 @@ impl Ring<'_> {
         for place in &self.places[side] {
             let piece = &self.sides[side].pieces[place.piece];
             let Some((uv, jet)) = foot_along(piece, p, self.frame, place.uv) else { continue };
+            // Another sheet of the side may pass nearby.
+            if (jet.p - self.center).dot(self.n).abs() > 0.25 * p.distance(self.center) + 1e-9 {
+                continue;
+            }
             let out = (-uv).max(uv - 1.0).max_element();
             if best.as_ref().is_none_or(|(o, ..)| out < *o) {
                 best = Some((out, Place { piece: place.piece, uv }, jet.p));
@@ -134,6 +138,7 @@ pub fn arms_of(
     joining: f64,
 ) -> Option<Contacted> {
     let ring = ring_around(sides, &binormal, pair, joining);
+    let wide = ring_around(sides, &binormal, pair, joining.max(radius));
     // Evenly spread angles, and the middles of the lobes that the second-order form predicts.
     let mut angles: Vec<f64> = (0..64).map(|k| f64::from(k) * std::f64::consts::TAU / 64.0 + 0.003).collect();
     let (_, e, _) = binormal.principal();
@@ -153,7 +158,8 @@ pub fn arms_of(
         let spread = |t: f64, list: &[f64]| list.iter().map(|&s| near(s, t)).fold(f64::INFINITY, f64::min);
         let agree = matched
             && circles[0].iter().all(|&t| spread(t, &circles[1]) < 0.2 && spread(t, &circles[2]) < 0.3)
-            && (count == 0 || count >= 2 || !closed(&ring, radius));
+            && (count == 0 || count >= 2 || !closed(&ring, radius))
+            && stays(&ring, &wide, radius);
         if agree {
             let arms = circles[0].iter().filter_map(|&t| {
                 let pick = |list: &[f64]| list.iter().copied().min_by(|&x, &y| near(x, t).total_cmp(&near(y, t)));
@@ -171,7 +177,7 @@ pub fn arms_of(
 
 /// Whether the gap is clearly open on nearly all of a circle: what is closed inside it is a point contact.
 pub fn is_point(sides: [&Side; 2], binormal: &Binormal, pair: [usize; 2], radius: f64, joining: f64, gap: f64) -> bool {
-    let ring = ring_around(sides, binormal, pair, joining);
+    let ring = ring_around(sides, binormal, pair, joining.max(radius));
     let open = (0..32).filter(|&k| {
         let s = ring.sample(f64::from(k) * std::f64::consts::TAU / 32.0 + 0.01, radius);
         s.is_some_and(|s| s.gap.abs() > 4.0 * gap)
@@ -179,8 +185,9 @@ pub fn is_point(sides: [&Side; 2], binormal: &Binormal, pair: [usize; 2], radius
     open.count() >= 24
 }
 
-fn ring_around<'a>(sides: [&'a Side; 2], binormal: &Binormal, pair: [usize; 2], joining: f64) -> Ring<'a> {
-    let places = [sides[0].around(binormal.p, joining), sides[1].around(binormal.p, joining)];
+/// The circles around a contact on all pieces within `reach` of it.
+fn ring_around<'a>(sides: [&'a Side; 2], binormal: &Binormal, pair: [usize; 2], reach: f64) -> Ring<'a> {
+    let places = [sides[0].around(binormal.p, reach), sides[1].around(binormal.p, reach)];
     let own = [Place { piece: pair[0], uv: binormal.at.uv }, Place { piece: pair[1], uv: binormal.at.st }];
     let places = [0, 1].map(|k| {
         let mut list = vec![own[k]];
@@ -188,6 +195,12 @@ fn ring_around<'a>(sides: [&'a Side; 2], binormal: &Binormal, pair: [usize; 2], 
         list
     });
     Ring { sides, center: binormal.p, n: binormal.n, frame: binormal.frame, places }
+}
+
+/// Whether a circle leaves the pieces around its middle only where the sides end: arms do not change pieces in it.
+fn stays(ring: &Ring<'_>, wide: &Ring<'_>, radius: f64) -> bool {
+    let mut angles = (0..32).map(|k| f64::from(k) * std::f64::consts::TAU / 32.0 + 0.01);
+    angles.all(|t| ring.sample(t, radius).is_some() || wide.sample(t, radius).is_none())
 }
 
 /// Whether the whole circle lies on both sides.

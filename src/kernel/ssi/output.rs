@@ -162,7 +162,10 @@ fn curve(engine: &Engine, tracer: &Tracer<'_>, bounds: &mut Bounds, chain: &Chai
             points.push(point);
         }
     };
-    let nodes: Vec<TraceNode> = chain.nodes.iter().map(|n| settled(engine, n)).collect();
+    let mut nodes: Vec<TraceNode> = chain.nodes.iter().map(|n| settled(engine, n)).collect();
+    if chain.mode == Mode::Tangential {
+        nodes = thinned(engine, bounds, &nodes, wanted);
+    }
     for (k, from) in nodes.iter().enumerate() {
         push(from);
         let Some(to) = nodes.get(k + 1) else { break };
@@ -210,6 +213,42 @@ fn curve(engine: &Engine, tracer: &Tracer<'_>, bounds: &mut Bounds, chain: &Chai
         region: None,
         points,
     }
+}
+
+/// The points of a curve of contact that chords within `wanted` need. Such curves are followed in steps that the gap
+/// beside them asks for, many times shorter than chords need to be.
+fn thinned(engine: &Engine, bounds: &mut Bounds, nodes: &[TraceNode], wanted: f64) -> Vec<TraceNode> {
+    let mut fits = |x: &TraceNode, y: &TraceNode| {
+        let off = x.off.max(y.off);
+        let (a, b) = (&engine.sides[0].pieces[x.pa], &engine.sides[1].pieces[x.pb]);
+        chord_bound(a, &bounds.get(0, x.pa, a), [x.at.uv, y.at.uv], off) <= wanted
+            && chord_bound(b, &bounds.get(1, x.pb, b), [x.at.st, y.at.st], off) <= wanted
+    };
+    let mut out: Vec<TraceNode> = nodes.first().copied().into_iter().collect();
+    let mut at = 0;
+    while at + 1 < nodes.len() {
+        // Twice as far as long as the chord fits, then back to the last that did.
+        let from = &nodes[at];
+        let straight = |k: usize| nodes[k].same_pair(from) && nodes[k].tangent.dot(from.tangent) > 0.9;
+        let last = (at + 1..nodes.len()).take_while(|&k| straight(k)).last().unwrap_or(at + 1);
+        let (mut good, mut step) = (at + 1, 2);
+        while good < last {
+            let next = (at + step).min(last);
+            if next <= good || !fits(from, &nodes[next]) {
+                break;
+            }
+            good = next;
+            step *= 2;
+        }
+        let (mut low, mut high) = (good, (at + step).min(last + 1));
+        while low + 1 < high {
+            let middle = (low + high) / 2;
+            if fits(from, &nodes[middle]) { low = middle } else { high = middle }
+        }
+        at = low;
+        out.push(nodes[at]);
+    }
+    out
 }
 
 /// What rounding does to points in model units.

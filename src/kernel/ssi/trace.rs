@@ -229,7 +229,7 @@ impl Tracer<'_> {
                 bend = [0.0; 4];
                 match self.cross(mode, &current, k) {
                     Some(next) => {
-                        if travelled > 1e-7 && next.same_pair(&start) && self.meets(&next, &start) {
+                        if travelled > 1e-7 && self.meets(&next, &start) {
                             out.push(next);
                             out.push(start);
                             return (out, End::Loop);
@@ -330,7 +330,7 @@ impl Tracer<'_> {
             }
             if !leaving {
                 hops = 0;
-            } else if travelled > 1e-7 && current.same_pair(&start) && self.meets(&current, &start) {
+            } else if travelled > 1e-7 && self.meets(&current, &start) {
                 out.push(start);
                 return (out, End::Loop);
             }
@@ -344,8 +344,11 @@ impl Tracer<'_> {
             && self.passes(from, to, start, 0.0)
     }
 
+    /// Whether two points on borders are one. Where borders of both sides meet, a curve may come back through other
+    /// pieces than those in which it started; then it must have the same direction too.
     fn meets(&self, a: &TraceNode, b: &TraceNode) -> bool {
-        a.p.distance(b.p) < 1e-8 && a.tangent.dot(b.tangent) > 0.7
+        let least = if a.same_pair(b) { 0.7 } else { 0.999 };
+        a.p.distance(b.p) < 1e-8 && a.tangent.dot(b.tangent) > least
     }
 
     /// The arc length after which a parameter has changed by about 1.
