@@ -39,7 +39,7 @@ pub struct DefectSearch {
 
 impl DefectSearch {
     /// The defect that is looked at.
-    fn current(&self) -> Option<&Defect> {
+    pub fn current(&self) -> Option<&Defect> {
         self.found.as_ref()?.list.get(self.current?)
     }
 }
