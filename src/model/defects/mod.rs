@@ -2,7 +2,8 @@
 //!
 //! - Edges ([`edges`]): free ones, gaps between neighbours, more than two faces at one edge, loops that are open or
 //!   cross themselves.
-//! - Pairs of faces ([`crossings`]): faces that cross each other, and faces that lie on one another over an area.
+//! - Pairs of faces ([`crossings`]): faces that cross each other, and faces that lie on one another over an area. A
+//!   crossing that is no deeper than the gap between edges of the same two faces is that gap and not listed again.
 //! - Single faces ([`quality`]): slivers, parametrizations whose lines nearly coincide or bunch up; on request
 //!   faces that run through themselves ([`crate::kernel::self_ssi`]).
 //!
@@ -11,9 +12,10 @@
 //! the chord tolerance. The intersection tool decides such pairs for
 //! certain. Results do not depend on the number of threads. Cost: some milliseconds a face; self-intersections more.
 
-use serde::Serialize;
+use std::collections::HashMap;
 
 use glam::DVec3;
+use serde::Serialize;
 
 use super::document::{Document, EntityId};
 use super::topology::EdgeAt;
@@ -188,6 +190,21 @@ pub fn find(document: &Document, options: &DefectOptions, job: &Job) -> Defects 
     let strips: Vec<usize> = out.of(DefectKind::Sliver).flat_map(|d| d.faces.iter().copied()).collect();
     let side = |d: &Defect| d.kind == DefectKind::Gap && matches!(d.faces.as_slice(), [f] if strips.contains(f));
     out.list.retain(|d| !side(d));
+    // Edges that weave around each other by their gap make faces cross no deeper than that: one defect, not two.
+    let mut gaps: HashMap<[usize; 2], f64> = HashMap::new();
+    for gap in out.of(DefectKind::Gap) {
+        for (k, &a) in gap.faces.iter().enumerate() {
+            for &b in &gap.faces[k + 1..] {
+                let widest = gaps.entry([a.min(b), a.max(b)]).or_default();
+                *widest = widest.max(gap.size);
+            }
+        }
+    }
+    let woven = |d: &Defect| match (d.depth, d.faces.as_slice()) {
+        (Some(depth), &[a, b]) => gaps.get(&[a.min(b), a.max(b)]).is_some_and(|&gap| depth <= gap),
+        _ => false,
+    };
+    out.list.retain(|d| !woven(d));
     for defect in &mut out.list {
         defect.entities = defect.faces.iter().filter_map(|&f| ids.get(f).copied()).collect();
     }

@@ -5,7 +5,7 @@
 //! Newton brings the place to rounding. It counts when it is inside both faces and further than the tolerance from the
 //! edges of both. Neighbours that merely meet do not count: their surfaces meet at the edge, or beyond that of the other.
 //!
-//! Cost: [`PLACES`] places an edge that is near, [`HALVINGS`] feet each, some hundred microseconds an edge. A crossing
+//! Cost: [`PLACES`] places an edge that is near, [`QUARTERINGS`] feet each, some hundred microseconds an edge. A crossing
 //! shorter than the distance of two places may be missed.
 
 use glam::{DVec2, DVec3};
@@ -17,8 +17,8 @@ use crate::kernel::job::Job;
 
 /// Places along an edge, at equal distances.
 const PLACES: usize = 48;
-/// Distances from the edge that are looked at: each half of the one before, the first being the margin.
-const HALVINGS: usize = 12;
+/// Distances from the edge that are looked at: each a quarter of the one before, the first being the margin.
+const QUARTERINGS: usize = 7;
 /// Steps of Newton's method.
 const STEPS: usize = 20;
 /// The sine of the least angle at which surfaces cross.
@@ -156,8 +156,8 @@ fn inwards(own: &Part<'_>, border: &Border, t: f64, other: &Part<'_>, margin: f6
     }
     let mut best: Option<(DVec3, f64)> = None;
     let mut st = other.uv(near.triangle);
-    for k in 0..HALVINGS {
-        let s = margin * 0.5_f64.powi(k as i32);
+    for k in 0..QUARTERINGS {
+        let s = margin * 0.25_f64.powi(k as i32);
         if s < 0.5 * least {
             break;
         }
@@ -165,7 +165,7 @@ fn inwards(own: &Part<'_>, border: &Border, t: f64, other: &Part<'_>, margin: f6
         st = foot;
         // Only what the line's direction here promises between the neighbouring places.
         let root = s - distance / slope;
-        if !(root > 0.4 * s && root < 2.5 * s) {
+        if !(root > 0.2 * s && root < 5.0 * s) {
             continue;
         }
         let Some((x, depth)) = settled(own, from, step, root, other, st) else { continue };

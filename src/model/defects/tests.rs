@@ -106,6 +106,17 @@ fn a_crossing_near_the_edge_of_a_curved_floor_is_found() {
 }
 
 #[test]
+fn edges_that_weave_by_their_gap_are_a_gap_and_no_crossing() {
+    // An upright tile whose lower edge is 4e-4 below the floor at one end and above it at the other, along the floor's edge.
+    let upright = quad([[1.0, 0.0, -4e-4], [1.0, 1.0, 4e-4], [1.0, 0.0, 1.0], [1.0, 1.0, 1.0]]);
+    let defects = found(&document(vec![tile(0.0, 0.0, 0.0), upright.clone()]));
+    assert_eq!((count(&defects, DefectKind::Gap), count(&defects, DefectKind::Crossing)), (1, 0), "{:?}", defects.list);
+    // A little inside the floor the same edge is a crossing where it goes deeper than the gap.
+    let through = upright.transformed(&DAffine3::from_translation(DVec3::new(-0.3, 0.0, -0.01)));
+    assert_eq!(count(&found(&document(vec![tile(0.0, 0.0, 0.0), through])), DefectKind::Crossing), 1);
+}
+
+#[test]
 fn neighbours_that_meet_at_an_edge_cross_nothing_whatever_their_angle() {
     let along = |angle: f64| {
         let (y, z) = (1.0 + angle.cos(), angle.sin());
