@@ -3,7 +3,7 @@
 //! The expected figures are those of OpenCASCADE 7.8 as Gmsh 4.15.2 has it, lengths in millimetres:
 //! `gmsh.model.occ.importShapes(file, highestDimOnly=False)` and the sum of `gmsh.model.occ.getMass(2, face)`. Not so the
 //! area of afem_777.stp: there that quadrature is off by 3.1 % on faces 71 and 100 and by 1.8 % on faces 9 to 16 (from 1, in the
-//! order of the file), as 400 x 400 Gauss points through OpenCASCADE's own `getDerivative` tell. The figure is by scipy 1.16:
+//! order of the file), as 400 x 400 Gauss points through OpenCASCADE's own `getDerivative` tell. The figure is by scipy 1.17:
 //! `BSpline` from the numbers in the file, 8 x 8 Gauss points in every quarter and in every eighth of every knot span, which
 //! agree to 1e-10, and with those of `getDerivative` on face 71 to 11 digits.
 //!

@@ -1,4 +1,7 @@
-//! Writes small files of every format into `corpus/`, with the program's own writers.
+//! Writes small files of every format into `corpus/`, with the program's own writers. It is a fuzz target that does so before
+//! its first input and ends, because whatever is built here is instrumented and wants libFuzzer.
+
+#![no_main]
 
 #[path = "../support/iges_text.rs"]
 mod iges_text;
@@ -25,7 +28,7 @@ fn save(document: &Document, name: &str, format: Format, to: &str, export: Expor
     Ok(())
 }
 
-fn main() -> Anything {
+fn write() -> Anything {
     let every_entity = iges_text::one_of_each().text();
     std::fs::write(folder("iges")?.join("one_of_each"), &every_entity)?;
     let trimmed = io::read(Path::new("one_of_each"), every_entity.as_bytes(), Some(Format::Iges))?.document;
@@ -56,3 +59,17 @@ fn main() -> Anything {
     }
     Ok(())
 }
+
+/// Writes them and ends.
+fn run() {
+    let code = match write() {
+        Ok(()) => 0,
+        Err(error) => {
+            eprintln!("{error}");
+            1
+        }
+    };
+    std::process::exit(code)
+}
+
+libfuzzer_sys::fuzz_target!(init: run(), |_bytes: &[u8]| {});

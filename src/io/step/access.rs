@@ -10,7 +10,7 @@ use super::part21::{Exchange, Instance, Record, Value};
 /// without a limit a small file could unfold without end.
 const UNFOLDING: usize = 64;
 /// What a file may unfold to however small it is, in bytes.
-const LEAST: usize = 4_000_000;
+const LEAST: usize = 1_000_000;
 /// What a value of a statement counts for, in bytes.
 const VALUE: usize = 64;
 
