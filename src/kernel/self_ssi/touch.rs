@@ -17,7 +17,7 @@ use super::hull::Rect;
 use super::sheet::Sheet;
 use crate::kernel::geom::Surface;
 use crate::kernel::job::Job;
-use crate::kernel::ssi::result::{CurveKind, Intersection, IntersectionCurve, Junction, JunctionKind};
+use crate::kernel::ssi::result::{CurveEnd, CurveKind, Intersection, IntersectionCurve, Junction, JunctionKind};
 use crate::kernel::ssi::{SsiOptions, TangencyPoint, intersect, tangency};
 
 /// Contact is looked for between boxes of these sizes.
@@ -180,9 +180,27 @@ impl<'a> Touches<'a> {
                 out.open.push((place, CROSSING));
             }
             out.points.extend(found.junctions.into_iter().filter(|j| j.kind == JunctionKind::Isolated));
-            out.curves.extend(found.curves.into_iter().filter(|c| c.kind == CurveKind::Tangential));
+            for mut curve in found.curves.into_iter().filter(|c| c.kind == CurveKind::Tangential) {
+                self.mark_ends(&mut curve, place, &mut out);
+                out.curves.push(curve);
+            }
         }
         out
+    }
+}
+
+impl Touches<'_> {
+    /// The border of a place is no border of the surface: a curve of contact that ends there goes on unseen.
+    fn mark_ends(&self, curve: &mut IntersectionCurve, place: [Rect; 2], out: &mut Contacts) {
+        let ends = [curve.points.first(), curve.points.last()];
+        for (end, p) in curve.ends.iter_mut().zip(ends) {
+            let on_border =
+                p.is_some_and(|p| [p.uv, p.st].into_iter().any(|uv| self.sheet.on_open_border(self.sheet.in_unit(uv))));
+            if *end == CurveEnd::Boundary && !on_border {
+                *end = CurveEnd::Unresolved;
+                out.open.push((place, "a curve along which two sheets touch could not be followed further"));
+            }
+        }
     }
 }
 
