@@ -7,6 +7,14 @@
 //! pieces by samples, which is not, with a margin. One grid has no cracks: neighbours share vertices, a row
 //! that collapses to a pole and the two sides of a closed seam get identical coordinates (but their own uv).
 //!
+//! What an adaptive triangulation would save, in cells for the same tolerance (1e-4 of each surface's diagonal, all polynomial
+//! surfaces of a file, vertices on sides of neighbours not counted): parts of spans halved one by one, each in the direction
+//! that bends more, 0.28 (airliner), 0.26 (nacelle), 0.41 (wing), 0.44 (car body), 0.50 (crossing patches of entity 114),
+//! 0.58 (rear screen), 0.79 (headlamp), 0.8 to 0.9 (single smooth patches); halved in both directions at once (a quadtree)
+//! 0.4 to 2.9; counts for each span with stitched borders 0.6 to 1.0. So direction matters, place hardly does. The grid stays
+//! because its lines are iso-lines and knot lines of the display, and because the intersection of triangulations finds
+//! more starting points that cannot be refined on the longer triangles, and then hands over whole pairs of surfaces.
+//!
 //! Cost: linear in the number of vertices. It cannot fail; where the cap on cells cut the grid short,
 //! [`SurfaceMesh::capped`] says so.
 
