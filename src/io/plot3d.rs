@@ -290,7 +290,7 @@ fn read_ascii(bytes: &[u8], report: &mut ImportReport) -> Option<(Layout, Vec<Gr
     let mut numbers = Vec::new();
     let mut trailing = false;
     for word in text.split(|c: char| c.is_whitespace() || c == ',').filter(|w| !w.is_empty()) {
-        if !push_numbers(word, &mut numbers) {
+        if !push_numbers(word, REPEATED * text.len() + 1024, &mut numbers) {
             trailing = true;
             break;
         }
@@ -321,12 +321,16 @@ fn read_ascii(bytes: &[u8], report: &mut ImportReport) -> Option<(Layout, Vec<Gr
     (!grids.is_empty()).then_some((layout, grids))
 }
 
-/// Reads one word: a number, with D exponents and Fortran's repeat counts (`3*1.0`).
-fn push_numbers(word: &str, numbers: &mut Vec<f64>) -> bool {
+/// How many numbers repeat counts may make of a byte. A grid that spells two of its coordinates has four bytes a point, for
+/// at most two values that repeat.
+const REPEATED: usize = 4;
+
+/// Reads one word: a number, with D exponents and Fortran's repeat counts (`3*1.0`), up to `limit` numbers in all.
+fn push_numbers(word: &str, limit: usize, numbers: &mut Vec<f64>) -> bool {
     let real = |w: &str| w.parse::<f64>().or_else(|_| w.replace(['d', 'D'], "e").parse::<f64>()).ok();
     if let Some((count, value)) = word.split_once('*') {
         let (Ok(count), Some(value)) = (count.parse::<usize>(), real(value)) else { return false };
-        if count > 10_000_000 || numbers.len() > 100_000_000 {
+        if numbers.len().checked_add(count).is_none_or(|all| all > limit) {
             return false;
         }
         numbers.extend(std::iter::repeat_n(value, count));

@@ -41,6 +41,8 @@ pub(super) struct Part<'s> {
     pub(super) bounds: Aabb,
     /// Its edges.
     pub(super) borders: Vec<Border>,
+    /// How far these are off the surface: no crossing can be told more closely.
+    off: f64,
     /// The edges as segments: their tree, and the edge and the parameters of each.
     segments: TriTree,
     of_segment: Vec<(u32, [f64; 2])>,
@@ -58,6 +60,7 @@ impl<'s> Part<'s> {
         };
         let tree = TriTree::new(mesh.points.clone(), &mesh.triangles);
         let borders = strips::borders(sheet);
+        let off = borders.iter().map(|border| border.off(surface)).fold(0.0, f64::max);
         // Segments are triangles with two equal corners.
         let (mut points, mut segments, mut of_segment) = (Vec::new(), Vec::new(), Vec::new());
         for (k, border) in borders.iter().enumerate() {
@@ -69,7 +72,18 @@ impl<'s> Part<'s> {
         }
         let bounds = Aabb::of(mesh.points.iter().copied());
         let segments = TriTree::new(points, &segments);
-        Self { sheet, closed: closed_directions(surface), mesh, tree, bounds, borders, segments, of_segment, chord }
+        Self {
+            sheet,
+            closed: closed_directions(surface),
+            mesh,
+            tree,
+            bounds,
+            borders,
+            off,
+            segments,
+            of_segment,
+            chord,
+        }
     }
 
     fn corners(&self, triangle: u32) -> [DVec3; 3] {
@@ -160,7 +174,8 @@ fn crossing(numbers: [usize; 2], p: &Part<'_>, q: &Part<'_>, options: &DefectOpt
         confirmed(p, q, 0.5 * (ends[0] + ends[1]), triangles, margin)
     });
     let Some(at) = at else {
-        let found = strips::find(p, q, margin, options.tolerance, job)?;
+        let least = options.tolerance.max(p.off + q.off);
+        let found = strips::find(p, q, margin, least, job)?;
         let crossing = defect(DefectKind::Crossing, numbers, &found.places, found.at, found.length);
         return Some(Defect { depth: Some(found.depth), ..crossing });
     };

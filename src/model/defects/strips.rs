@@ -2,8 +2,8 @@
 //!
 //! From places along every edge of one face that are near another face, a line runs into the face, square to the edge.
 //! Where its signed distance from the other surface, along that surface's normal, goes through zero the surfaces cross;
-//! Newton brings the place to rounding. It counts when it is inside both faces and further than the tolerance from the
-//! edges of both. Neighbours that merely meet do not count: their surfaces meet at the edge, or beyond that of the other.
+//! Newton brings the place to rounding. It counts when it is inside both faces and further from the edges of both than the
+//! tolerance, and than the edges themselves are off their surfaces. Neighbours that merely meet do not count: their surfaces meet at the edge, or beyond that of the other.
 //!
 //! Cost: [`PLACES`] places an edge that is near, [`QUARTERINGS`] feet each, some hundred microseconds an edge. A crossing
 //! shorter than the distance of two places may be missed.
@@ -50,6 +50,12 @@ impl Border {
             On::Side(Side::UMin) => DVec2::new(u[0], t),
             On::Edge(edge) => edge.uv(t),
         }
+    }
+
+    /// The largest distance between the curve and the place of the surface with its parameters.
+    pub(super) fn off(&self, surface: &Surface) -> f64 {
+        let apart = |(t, p): (f64, DVec3)| surface.eval(surface.clamped(self.uv(surface, t))).distance(p);
+        self.curve.sampled(4).into_iter().map(apart).fold(0.0, f64::max)
     }
 
     /// Parameters at equal distances along the curve, its ends among them, and the distance.
