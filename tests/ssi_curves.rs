@@ -53,7 +53,15 @@ fn pairs() -> Vec<(&'static str, Surface, Surface)> {
     let whole = graph(3, |x, y| 0.4 * x * x * y - 0.3 * y * y + 0.2 * x);
     let parts = [whole.restricted([-1.0, 0.4], [-1.0, 0.3]), whole.restricted([-0.3, 1.0], [-0.6, 1.0])];
     let [a, b] = parts.map(Result::unwrap);
+    // Flat for x < 0 and a parabola for x > 0: a curve that weaves over the knot line between them.
+    let kinked = {
+        let (u, v) = (Knots::clamped(2, &[-1.0, 0.0, 1.0], 1).unwrap(), Knots::bezier(1, -1.0, 1.0).unwrap());
+        let row = |y: f64| [(-1.0, 0.0), (-0.5, 0.0), (0.5, 0.0), (1.0, 3.0)].map(|(x, z)| DVec3::new(x, y, z));
+        Surface::new(u, v, [row(-1.0), row(1.0)].concat(), None).unwrap()
+    };
+    let wall = turn(&graph(9, |_, y| 0.02 * (5.0 * y).sin() + 0.3 * y * y * y * y - 0.05), DVec3::Y, half);
     vec![
+        ("weaving over a knot line", moved(kinked), moved(wall)),
         ("loop", bowl, turn(&rectangle(2.0, 2.0, 0.0), DVec3::Z, 0.3)),
         ("unequal cylinders", moved(cylinder(1.0, -2.0, 2.0)), moved(turn(&cylinder(0.7, -2.0, 2.0), DVec3::X, half))),
         ("cylinders at 0.5 degrees", cylinder(1.0, -2.0, 2.0), turn(&cylinder(1.0, -2.0, 2.0), DVec3::X, 0.00873)),
