@@ -255,9 +255,12 @@ pub fn ruled_by_length(first: &Curve, second: &Curve) -> Result<(Surface, f64), 
 const OFFSET: f64 = 1e-7;
 /// The most pieces of an offset surface for each knot span of its basis, so that memory stays in proportion to that.
 const MAX_PIECES: usize = 16;
+/// The most cells of an offset surface; eight for each of its basis where that has more spans. A ruled surface by arc
+/// length has many spans of its own, whose pieces would multiply.
+const MAX_CELLS: usize = 1024;
 
 /// The surface at a distance along its normal as a C1 bicubic spline, halved until the middles of its cells are within 1e-7
-/// of its size (at most 16 pieces a span), and how far off they are. Where the surface has no normal the point itself is kept.
+/// of its size (at most 16 pieces a span and [`MAX_CELLS`] in all), and how far off they are. Where the surface has no normal the point itself is kept.
 pub fn offset(surface: &Surface, distance: f64) -> Result<(Surface, f64), SweepError> {
     let domain = surface.domain();
     let at = |uv: DVec2| {
@@ -301,7 +304,10 @@ pub fn offset(surface: &Surface, distance: f64) -> Result<(Surface, f64), SweepE
                 }
             }
         }
-        let room = (0..2).all(|k| 2 * (lines[k].len() - 1) <= MAX_PIECES * (surface.knots()[k].breaks().len() - 1));
+        let spans = [0, 1].map(|k| surface.knots()[k].breaks().len() - 1);
+        let after = [0, 1].map(|k| lines[k].len() - 1 + split[k].iter().filter(|s| **s).count());
+        let room = (0..2).all(|k| 2 * (lines[k].len() - 1) <= MAX_PIECES * spans[k])
+            && after[0] * after[1] <= MAX_CELLS.max(8 * spans[0] * spans[1]);
         if worst <= tol || !room {
             return Ok((made, worst));
         }
