@@ -226,7 +226,8 @@ impl Drop for Jobs {
     }
 }
 
-/// Runs a job. Its outcome is handed on before the record says that it has ended: who sees the end finds the outcome.
+/// Runs a job. Its outcome is handed on while the record is locked: who sees the end finds the outcome, and who has the
+/// outcome sees the end.
 fn run<T>(
     records: &Records,
     id: JobId,
@@ -236,8 +237,10 @@ fn run<T>(
     hand_on: impl FnOnce(Outcome<T>),
 ) {
     if job.is_cancelled() {
-        hand_on(Outcome::NeverRan);
-        update(records, id, |r| r.state = State::Cancelled);
+        update(records, id, |r| {
+            r.state = State::Cancelled;
+            hand_on(Outcome::NeverRan);
+        });
         return;
     }
     let start = Instant::now();
@@ -252,8 +255,10 @@ fn run<T>(
             (State::Panicked(message.clone()), Outcome::Panicked { message, input })
         }
     };
-    hand_on(outcome);
-    update(records, id, |r| (r.state, r.took) = (state, Some(start.elapsed())));
+    update(records, id, |r| {
+        (r.state, r.took) = (state, Some(start.elapsed()));
+        hand_on(outcome);
+    });
 }
 
 fn update(records: &Records, id: JobId, change: impl FnOnce(&mut JobRecord)) {

@@ -216,9 +216,17 @@ pub struct Engine {
 
 impl Engine {
     fn run(&mut self, traversal: &Traversal, job: &Job) {
-        self.find_contacts(&traversal.findings);
+        self.find_contacts(&traversal.findings, job);
+        if job.is_cancelled() {
+            self.cancelled(traversal);
+            return;
+        }
         let (coincident, undecided) = self.flat_contacts(&traversal.findings);
         for contact in 0..self.contacts.len() {
+            if job.is_cancelled() {
+                self.cancelled(traversal);
+                return;
+            }
             for arm in 0..self.contacts[contact].arms.len() {
                 if !self.contacts[contact].arms[arm].used {
                     self.trace_arm(contact, arm);
@@ -245,8 +253,12 @@ impl Engine {
             self.trace_arc(arc);
             job.progress(0.5 + 0.5 * (k + traversal.findings.seeds.len()) as f64 / total);
         }
+        self.regions = region::regions(self, &coincident, job);
+        if job.is_cancelled() {
+            self.cancelled(traversal);
+            return;
+        }
         self.open_pairs(&traversal.unresolved);
-        self.regions = region::regions(self, &coincident);
         if self.regions.is_empty() {
             self.settle_undecided(&coincident);
         }
@@ -315,9 +327,12 @@ impl Engine {
     }
 
     /// Polishes critical points on the exact surfaces and finds the arms of those that are contacts.
-    fn find_contacts(&mut self, findings: &Findings) {
+    fn find_contacts(&mut self, findings: &Findings, job: &Job) {
         let mut found: Vec<(binormal::Binormal, [usize; 2], bool)> = Vec::new();
         for critical in &findings.criticals {
+            if job.is_cancelled() {
+                return;
+            }
             let (a, b) = (&self.sides[0].pieces[critical.pa], &self.sides[1].pieces[critical.pb]);
             // From the gap's own critical point, else from the binormals of the osculating tori (thesis 5.3).
             let polished = binormal::polish(a, b, critical.at, 0.02, false);

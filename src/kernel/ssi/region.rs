@@ -11,6 +11,7 @@ use super::contact::Cell;
 use super::engine::Engine;
 use super::result::CurvePoint;
 use super::side::{Place, closest, closest_from};
+use crate::kernel::job::Job;
 
 /// A region in the unit frame.
 #[derive(Clone, Debug, Default)]
@@ -42,8 +43,8 @@ struct Finder<'a> {
     near: f64,
 }
 
-/// Finds all regions from cells in which the gap vanishes. Pieces without such cells take no part.
-pub fn regions(engine: &Engine, cells: &[Cell]) -> Vec<CoincidentRegion> {
+/// Finds all regions from cells in which the gap vanishes. Pieces without such cells take no part. None when cancelled.
+pub fn regions(engine: &Engine, cells: &[Cell], job: &Job) -> Vec<CoincidentRegion> {
     if cells.is_empty() {
         return Vec::new();
     }
@@ -54,6 +55,9 @@ pub fn regions(engine: &Engine, cells: &[Cell]) -> Vec<CoincidentRegion> {
     pairs.dedup();
     let mut intervals: Vec<Vec<RegionPoint>> = Vec::new();
     for &(pa, pb) in &pairs {
+        if job.is_cancelled() {
+            return Vec::new();
+        }
         for fixed in 0..2 {
             for value in [0.0, 1.0] {
                 intervals.extend(finder.border([pa, pb], 0, fixed, value));
@@ -64,6 +68,9 @@ pub fn regions(engine: &Engine, cells: &[Cell]) -> Vec<CoincidentRegion> {
     // A border of A that runs along one of B, and a border shared by two pairs, were met twice.
     let mut kept: Vec<Vec<RegionPoint>> = Vec::new();
     for interval in intervals {
+        if job.is_cancelled() {
+            return Vec::new();
+        }
         let middle = interval[interval.len() / 2].p;
         let step = interval.windows(2).map(|w| w[0].p.distance(w[1].p)).fold(0.0, f64::max);
         let known = |other: &Vec<RegionPoint>| {
