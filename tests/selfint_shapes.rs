@@ -9,11 +9,12 @@ mod shapes;
 use std::time::Instant;
 
 use glam::{DVec2, DVec3};
+use patchwright::kernel::geom::sweep::revolved;
 use patchwright::kernel::geom::{Direction, Knots, Surface};
 use patchwright::kernel::job::Job;
 use patchwright::kernel::self_ssi::{SelfIntersectOptions, SelfIntersection, self_intersect};
 use patchwright::kernel::ssi::result::{CurveEnd, CurveKind, IntersectionCurve, JunctionKind};
-use shapes::{interpolate, ridge, sextic, spans, spun, square, turned};
+use shapes::{curve_through, interpolate, ridge, sextic, spans, spun, square, turned};
 
 fn solve(name: &str, surface: &Surface) -> SelfIntersection {
     let started = Instant::now();
@@ -455,32 +456,66 @@ fn sheets_that_touch_in_a_point_are_one_isolated_contact() {
 }
 
 #[test]
-fn sheets_that_touch_along_a_line_have_tangential_curves_and_what_is_open_is_listed() {
-    let found = solve("touching along a line", &touching(|_, _| 0.0));
-    let r = &found.result;
-    assert!(r.junctions.is_empty() && r.miters.is_empty() && r.regions.is_empty());
-    assert!(!r.curves.is_empty() && r.curves.iter().all(|c| c.kind == CurveKind::Tangential));
-    for p in r.curves.iter().flat_map(|c| &c.points) {
-        assert!((p.uv.x.abs() - 1.0).abs() < 1e-5 && (p.uv.x + p.st.x).abs() < 1e-5 && (p.uv.y - p.st.y).abs() < 1e-5);
-    }
-    // A curve ends at the border of the surface, or the answer is not complete.
-    for c in &r.curves {
-        for (end, p) in c.ends.iter().zip([c.points.first(), c.points.last()]) {
-            let at_border = (p.unwrap().uv.y.abs() - 1.0).abs() < 1e-6;
-            assert_eq!(*end == CurveEnd::Boundary, at_border, "{:?}", p);
-            assert!(at_border || !r.complete);
+fn sheets_that_touch_along_a_curve_have_it_once_from_end_to_end() {
+    // Straight, bent in space, and aslant in the domain.
+    let bent = |t: f64, v: f64| turned(DVec3::new(t.powi(3) - t, v, (t * t - 1.0).powi(2) * (t + 2.0) + 0.3 * v * v));
+    let (ku, kv) = (Knots::bezier(5, -1.05, 1.05).unwrap(), Knots::bezier(5, -1.0, 1.0).unwrap());
+    for (name, slope, surface) in [
+        ("along a line", 0.0, touching(|_, _| 0.0)),
+        ("along a parabola", 0.0, interpolate(&ku, &kv, bent)),
+        ("aslant", 0.05, interpolate(&ku, &kv, |u, v| bent(u - 0.05 * v, v))),
+    ] {
+        let found = solve(name, &surface);
+        let r = &found.result;
+        assert!(r.complete && r.junctions.is_empty() && r.miters.is_empty() && r.regions.is_empty(), "{name}");
+        assert_eq!(r.curves.len(), 1, "{name}");
+        let curve = &r.curves[0];
+        assert_eq!((curve.kind, curve.ends), (CurveKind::Tangential, [CurveEnd::Boundary; 2]), "{name}");
+        for p in &curve.points {
+            let [t, s] = [p.uv, p.st].map(|p| p.x - slope * p.y);
+            assert!((t.abs() - 1.0).abs() < 1e-5 && (t + s).abs() < 1e-5 && (p.uv.y - p.st.y).abs() < 1e-5, "{name}");
         }
+        let ends = [curve.points[0], curve.points[curve.points.len() - 1]].map(|p| p.uv.y);
+        assert!((ends[0] + ends[1]).abs() < 1e-9 && (ends[0].abs() - 1.0).abs() < 1e-9, "{name}: {ends:?}");
     }
 }
 
 #[test]
-fn sheets_that_are_tangent_and_cross_are_said_to_be_open() {
-    // 2 x^2 - v^2: two branches cross in the point of contact.
-    let started = Instant::now();
+fn sheets_of_a_surface_of_revolution_touch_along_a_circle() {
+    let k = Knots::bezier(5, -1.1, 1.1).unwrap();
+    let profile = curve_through(&k, |t| DVec3::new(t.powi(3) - t + 2.0, 0.0, (t * t - 1.0).powi(2) * (t + 2.0)));
+    let surface = revolved(&profile, DVec3::ZERO, DVec3::Z, 0.3, 0.3 + std::f64::consts::TAU).unwrap();
+    let found = solve("touching along a circle", &surface);
+    let r = &found.result;
+    assert!(r.complete && r.junctions.is_empty() && r.curves.len() == 1, "{:?}", r.unresolved);
+    let circle = &r.curves[0];
+    assert!(circle.kind == CurveKind::Tangential && circle.closed);
+    for p in &circle.points {
+        assert!((p.xyz.truncate().length() - 2.0).abs() < 1e-9 && p.xyz.z.abs() < 1e-9, "{}", p.xyz);
+    }
+}
+
+#[test]
+fn sheets_that_are_tangent_and_cross_have_a_junction_of_four_curves() {
+    // The heights differ by 2 x^2 - v^2: two branches cross in the point of contact.
     let found = solve("tangent and crossing", &touching(|t, v| -0.5 * t * v * v));
     let r = &found.result;
-    assert!(!r.complete && r.unresolved.iter().any(|u| u.reason.contains("tangent here and cross")), "{r:?}");
-    assert!(r.unresolved.len() < 10 && started.elapsed().as_secs_f64() < 30.0);
+    assert!(r.complete && r.miters.is_empty() && r.regions.is_empty(), "{:?}", r.unresolved);
+    assert!(r.junctions.len() == 1 && r.junctions[0].kind == JunctionKind::X);
+    assert!(r.junctions[0].xyz.distance(turned(DVec3::ZERO)) < 1e-9);
+    assert_eq!(curves(&found).len(), 4);
+    for c in curves(&found) {
+        let mut ends = c.ends;
+        ends.sort_by_key(|e| *e == CurveEnd::Junction);
+        assert_eq!(ends, [CurveEnd::Boundary, CurveEnd::Junction]);
+        let inner = if c.ends[0] == CurveEnd::Junction { c.points.first() } else { c.points.last() };
+        assert!(inner.unwrap().xyz.distance(turned(DVec3::ZERO)) < 1e-9);
+        // x = t^3 - t on both sheets, so that the branches are where heights and x agree.
+        for p in &c.points {
+            let x = |t: f64| t.powi(3) - t;
+            assert!((x(p.uv.x) - x(p.st.x)).abs() < 1e-9 && (p.uv.y - p.st.y).abs() < 1e-9);
+        }
+    }
 }
 
 /// A projective map takes a cuspidal edge to a cuspidal edge.

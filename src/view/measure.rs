@@ -3,7 +3,7 @@
 //!
 //! The gap of two curves is the least and the largest distance of a point of either from the other. Distances to a
 //! curve are global ([`closest_on_curve`]); which point to ask is found on [`SAMPLES`] points of each curve and
-//! refined by bisection of the interval around the best, so a place narrower than a sample step can be missed. Cost:
+//! refined by thirds of the interval around the best, so a place narrower than a sample step can be missed. Cost:
 //! some milliseconds. Where a curve or a surface has gone from the scene, that part is left out.
 
 use glam::DVec3;

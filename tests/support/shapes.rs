@@ -3,7 +3,7 @@
 #![allow(dead_code, clippy::unwrap_used, reason = "a test helper may stop the test; not every test uses all")]
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
-use patchwright::kernel::geom::{Knots, Surface};
+use patchwright::kernel::geom::{Curve, Knots, Surface};
 
 /// Solves the interpolation problem of one direction: rows of basis values at the Greville abscissae.
 fn interpolate_line(knots: &Knots, values: &[DVec3]) -> Vec<DVec3> {
@@ -42,6 +42,12 @@ fn interpolate_line(knots: &Knots, values: &[DVec3]) -> Vec<DVec3> {
         out[c] = (rows[c].1 - sum) / rows[c].0[c];
     }
     out
+}
+
+/// The curve through `f` at the Greville abscissae.
+pub fn curve_through(knots: &Knots, f: impl Fn(f64) -> DVec3) -> Curve {
+    let values: Vec<DVec3> = knots.greville().iter().map(|&t| f(t)).collect();
+    Curve::new(knots.clone(), interpolate_line(knots, &values), None).unwrap()
 }
 
 /// The spline through `f` at the Greville abscissae: exact where `f` is a polynomial of no higher degree.

@@ -361,7 +361,7 @@ impl<'a> Search<'a> {
                 Verdict::Split => {}
             }
             let job = self.job;
-            if self.touches.as_mut().is_some_and(|t| t.look(&a.rect, &b.rect, job) != Touch::No) {
+            if self.touches.as_mut().is_some_and(|t| t.look([(&a.rect, pa), (&b.rect, pb)], job) != Touch::No) {
                 return;
             }
         }

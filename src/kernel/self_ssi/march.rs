@@ -25,7 +25,7 @@ pub(crate) enum End {
     /// In a miter point at these parameters.
     Miter(DVec2),
     Loop,
-    /// In the triple point with this number.
+    /// In the junction with this number.
     Triple(usize),
     /// Newton failed or a cap was hit.
     Lost,

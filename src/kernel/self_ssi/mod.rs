@@ -206,6 +206,12 @@ pub fn self_intersect(
         let kind = JunctionKind::HigherOrder;
         result.junctions.push(Junction { xyz, a: number, uv, b: number, st, gap: 0.0, kind });
     }
+    let (mut contacts, touching) = contacts.unwrap_or_default();
+    for junction in std::mem::take(&mut contacts.crossings) {
+        let at = [junction.uv, junction.st].map(|p| sheet.in_unit(p));
+        while triple::split(&sheet, &mut traces, at, result.junctions.len()) {}
+        result.junctions.push(junction);
+    }
     for trace in &mut traces {
         let bound = assembler.refine(trace, tol / sheet.scale) * sheet.scale;
         let mut ends = [CurveEnd::Unresolved; 2];
@@ -286,7 +292,6 @@ pub fn self_intersect(
         result.unresolved.push(open(pair, reason));
     }
     result.unresolved.extend(found.open.iter().map(|(pair, reason)| open(*pair, reason)));
-    let (contacts, touching) = contacts.unwrap_or_default();
     result.unresolved.extend(touching.iter().chain(&contacts.open).map(|(pair, reason)| open(*pair, reason)));
     result.junctions.extend(contacts.points);
     result.curves.extend(contacts.curves);

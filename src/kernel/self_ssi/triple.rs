@@ -145,10 +145,17 @@ fn polished(sheet: &Sheet, start: [DVec2; 3], reach: f64) -> Option<[DVec2; 3]> 
     (a.distance(b).max(a.distance(c)) <= 1e-11_f64.max(4.0 * sheet.rounding)).then_some(p)
 }
 
-/// Cuts the branch through a pair of parameter points there; false where no branch passes.
-fn split(sheet: &Sheet, traces: &mut Vec<Trace>, pair: [DVec2; 2], number: usize) -> bool {
+/// Cuts a branch through a pair of parameter points there, one that does not end there yet; false where none passes.
+pub(crate) fn split(sheet: &Sheet, traces: &mut Vec<Trace>, pair: [DVec2; 2], number: usize) -> bool {
     let mut best: Option<(f64, usize, usize, [DVec2; 2])> = None;
     for (trace, t) in traces.iter().enumerate() {
+        let near = |x: DVec2, y: DVec2| (x - y - turns(sheet, x, y)).length() < SAME;
+        let here =
+            |n: &[DVec2; 2]| near(n[0], pair[0]) && near(n[1], pair[1]) || near(n[0], pair[1]) && near(n[1], pair[0]);
+        let outer = [t.nodes.first(), t.nodes.last()];
+        if outer.iter().zip(t.ends).any(|(n, end)| end == End::Triple(number) && n.is_some_and(here)) {
+            continue;
+        }
         for (at, s) in t.nodes.windows(2).enumerate() {
             for swap in [false, true] {
                 let [p, q] = if swap { [pair[1], pair[0]] } else { pair };

@@ -1,4 +1,4 @@
-//! Collinear-normal points of two pieces, polished on the exact surfaces, and the relative second fundamental form.
+//! Collinear-normal points of two patches, polished on the exact surfaces, and the relative second fundamental form.
 //!
 //! Newton's method on the gradient of the gap, in the tangent plane of A at the current point, with the foot on B
 //! found again in every iteration (plain Newton on the four binormal equations fails near tangency). The Hessian of
@@ -9,7 +9,7 @@ use glam::{DMat2, DVec2, DVec3};
 
 use super::contact::{foot_along, frame_across};
 use super::correct::PointPair;
-use super::piece::{Jet2, Patch, Piece};
+use super::piece::{Jet2, Patch};
 
 /// A point of A, its foot on B along A's normal, and how the surfaces differ there to second order.
 #[derive(Clone, Copy, Debug)]
@@ -64,7 +64,7 @@ fn graph(jet: &Jet2, n: DVec3, frame: [DVec3; 2]) -> Option<(DMat2, DVec2, [f64;
 }
 
 /// Looks at one point of A and its foot on B.
-pub fn look(a: &Piece, b: &Piece, at: PointPair) -> Option<(Binormal, DMat2)> {
+pub fn look(a: &impl Patch, b: &impl Patch, at: PointPair) -> Option<(Binormal, DMat2)> {
     let ja = a.jet2(at.uv);
     let n = ja.u.cross(ja.v).normalize_or_zero();
     if n == DVec3::ZERO {
@@ -83,7 +83,7 @@ pub fn look(a: &Piece, b: &Piece, at: PointPair) -> Option<(Binormal, DMat2)> {
 
 /// The collinear-normal point near `start`; with `ridge`, only across the direction in which the form is largest: the
 /// floor of a valley. Steps are at most `reach`.
-pub fn polish(a: &Piece, b: &Piece, start: PointPair, reach: f64, ridge: bool) -> Option<Binormal> {
+pub fn polish(a: &impl Patch, b: &impl Patch, start: PointPair, reach: f64, ridge: bool) -> Option<Binormal> {
     let mut at = start;
     let mut last = f64::INFINITY;
     for _ in 0..40 {

@@ -113,7 +113,12 @@ pub struct Findings {
 }
 
 /// The foot of the point `p` on a piece along `n`, by Newton's method from `start`: parameters and jet.
-pub fn foot_along(piece: &Piece, p: DVec3, frame: [DVec3; 2], start: DVec2) -> Option<(DVec2, super::piece::Jet1)> {
+pub fn foot_along(
+    piece: &impl Patch,
+    p: DVec3,
+    frame: [DVec3; 2],
+    start: DVec2,
+) -> Option<(DVec2, super::piece::Jet1)> {
     let mut st = start;
     for _ in 0..20 {
         let jet = piece.jet1(st);

@@ -216,17 +216,19 @@ pub struct Engine {
 
 impl Engine {
     fn run(&mut self, traversal: &Traversal, job: &Job) {
-        self.find_contacts(&traversal.findings, job);
-        if job.is_cancelled() {
+        if self.trace_all(traversal, job).is_none() {
             self.cancelled(traversal);
-            return;
         }
+    }
+
+    /// `None` when cancelled.
+    fn trace_all(&mut self, traversal: &Traversal, job: &Job) -> Option<()> {
+        let go_on = || (!job.is_cancelled()).then_some(());
+        self.find_contacts(&traversal.findings, job);
+        go_on()?;
         let (coincident, undecided) = self.flat_contacts(&traversal.findings);
         for contact in 0..self.contacts.len() {
-            if job.is_cancelled() {
-                self.cancelled(traversal);
-                return;
-            }
+            go_on()?;
             for arm in 0..self.contacts[contact].arms.len() {
                 if !self.contacts[contact].arms[arm].used {
                     self.trace_arm(contact, arm);
@@ -238,31 +240,23 @@ impl Engine {
         }
         let total = (traversal.arcs.len() + traversal.findings.seeds.len()).max(1) as f64;
         for (k, seed) in traversal.findings.seeds.iter().enumerate() {
-            if job.is_cancelled() {
-                self.cancelled(traversal);
-                return;
-            }
+            go_on()?;
             self.trace_contact_seed(seed);
             job.progress(0.5 + 0.5 * k as f64 / total);
         }
         for (k, arc) in traversal.arcs.iter().enumerate() {
-            if job.is_cancelled() {
-                self.cancelled(traversal);
-                return;
-            }
+            go_on()?;
             self.trace_arc(arc);
             job.progress(0.5 + 0.5 * (k + traversal.findings.seeds.len()) as f64 / total);
         }
         self.regions = region::regions(self, &coincident, job);
-        if job.is_cancelled() {
-            self.cancelled(traversal);
-            return;
-        }
+        go_on()?;
         self.open_pairs(&traversal.unresolved);
         if self.regions.is_empty() {
             self.settle_undecided(&coincident);
         }
         self.settle_undecided(&undecided);
+        Some(())
     }
 
     /// Lists what the descent left, apart from points in which only borders meet (no crossing is there) and those

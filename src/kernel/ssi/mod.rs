@@ -8,7 +8,7 @@
 
 mod bernstein;
 pub mod biarc;
-mod binormal;
+pub(crate) mod binormal;
 pub mod clip;
 mod contact;
 mod correct;

@@ -3,7 +3,6 @@
 //! the mouse, the keys. What is about the search only is in `inspect_search`.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::DVec2;
 
@@ -12,10 +11,10 @@ use super::super::linked::From;
 use super::super::panels::uv::UvPointer;
 use super::super::settings::Theme;
 use super::super::viewport::{Pointer, hit_entity};
-use super::Tool;
 use super::inspect_overlay::Dressed;
 use super::inspect_search::SearchView;
 use super::inspect_subject::{Polled, Subject};
+use super::{Tool, fresh};
 use crate::kernel::bvh::NodeId;
 use crate::kernel::geom::Surface;
 use crate::model::document::EntityId;
@@ -31,12 +30,6 @@ const HEIGHT: u32 = 6;
 const LEAVES: usize = 1 << 16;
 /// The level until another is chosen has at most so many nodes.
 const NODES: usize = 1000;
-
-/// A number that no other call returns: buffers and textures of one session must not pass for those of the next.
-pub fn fresh() -> u64 {
-    static NEXT: AtomicU64 = AtomicU64::new(1);
-    NEXT.fetch_add(1, Ordering::Relaxed)
-}
 
 /// What is looked at.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

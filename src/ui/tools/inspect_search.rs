@@ -6,7 +6,8 @@ use glam::DVec2;
 
 use super::super::theme;
 use super::super::viewport::{Overlay, linear};
-use super::inspect::{InspectSession, Look, fresh};
+use super::fresh;
+use super::inspect::{InspectSession, Look};
 use crate::model::document::EntityId;
 use crate::render::{ColorScale, Dash, Field, Hidden, LineStyle, Sketch, srgb, with_alpha};
 use crate::view::inspect::{

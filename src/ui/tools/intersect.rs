@@ -2,13 +2,12 @@
 //! worker computes, the result is looked at, and curves of it are kept or written.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::super::editor::{Editor, Page};
 use super::super::viewport::{Pointer, hit_entity};
-use super::Tool;
 use super::intersect_plane::PlaneDemo;
 use super::intersect_uv::UvShown;
+use super::{Tool, fresh};
 use crate::kernel::geom::Surface;
 use crate::kernel::intersect::Engine;
 use crate::kernel::ssi::{Tangency, tangency};
@@ -113,12 +112,6 @@ pub struct Drawn {
     pub sketch: Sketch,
     /// Whether a field is shaded.
     pub shaded: bool,
-}
-
-/// A revision that no overlay has had.
-fn fresh() -> u64 {
-    static NEXT: AtomicU64 = AtomicU64::new(1);
-    NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
 impl IntersectSession {

@@ -1,7 +1,5 @@
 //! The Measure tool: two clicks, and what lies between them. The numbers come from [`crate::view::measure`].
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use egui::{RichText, Ui, vec2};
 use glam::DVec3;
 
@@ -9,7 +7,7 @@ use super::super::editor::{Editor, Page};
 use super::super::status::{length, short};
 use super::super::viewport::{Overlay, Pointer, linear, tag};
 use super::super::{app, panels, theme};
-use super::Tool;
+use super::{Tool, fresh};
 use crate::model::document::Unit;
 use crate::render::{Dash, GlyphData, GlyphShape, Hidden, Sketch, with_alpha};
 use crate::view::measure::{Measurement, Place, Span, measure};
@@ -38,8 +36,7 @@ impl Editor {
     pub fn start_measure(&mut self) {
         self.leave_tool();
         // What an earlier session has drawn must not pass for what this one draws.
-        static NEXT: AtomicU64 = AtomicU64::new(1);
-        let revision = NEXT.fetch_add(1 << 24, Ordering::Relaxed);
+        let revision = fresh() << 24;
         self.tool = Tool::Measure(Box::new(MeasureSession { revision, ..MeasureSession::default() }));
         self.show_page(Page::Tool);
     }

@@ -1,6 +1,7 @@
 //! The tools: what a click in the view means, what the status line says, what the Tool page shows.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use egui::{Order, Ui, vec2};
 use glam::{DVec2, DVec3};
@@ -56,6 +57,13 @@ pub enum Tool {
     Intersect(Box<IntersectSession>),
     /// Two places are measured.
     Measure(Box<MeasureSession>),
+}
+
+/// A number that no other call returns: what one session has put on the graphics card must not pass for what the next
+/// one draws.
+fn fresh() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(1);
+    NEXT.fetch_add(1, Ordering::Relaxed)
 }
 
 /// The list of everything under the cursor, opened by Alt+click.
@@ -277,14 +285,8 @@ impl Editor {
                 let held = crate::view::navigation::Modifiers::NONE;
                 self.patch_event(Event::Click { hit: Some(hit), snap: None, held });
             }
-            Tool::Intersect(_) => {
-                let held = crate::view::navigation::Modifiers::NONE;
-                self.intersect_pointer(&Pointer { click: Some((Some(hit), held)), ..Pointer::default() });
-            }
-            Tool::Measure(_) => {
-                let held = crate::view::navigation::Modifiers::NONE;
-                self.measure_pointer(&Pointer { click: Some((Some(hit), held)), ..Pointer::default() });
-            }
+            Tool::Intersect(_) => self.intersect_pointer(&Pointer::clicked(hit)),
+            Tool::Measure(_) => self.measure_pointer(&Pointer::clicked(hit)),
         }
     }
 

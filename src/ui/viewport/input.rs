@@ -39,6 +39,13 @@ pub struct Pointer {
     pub held: Modifiers,
 }
 
+impl Pointer {
+    /// A click on something, chosen otherwise than with the mouse.
+    pub fn clicked(hit: PickHit) -> Self {
+        Self { click: Some((Some(hit), Modifiers::NONE)), ..Self::default() }
+    }
+}
+
 /// What decides what is under the cursor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HoverStamp {

@@ -519,6 +519,8 @@ impl PatchTool {
         if !self.is_ambiguous() {
             self.other_loop = false;
         }
+        // Whether to cut is decided by the corners as they are without a cut.
+        self.cut = None;
         self.corners = self.corners_now();
         self.cut = self.find_cut();
         if let Some(cut) = &self.cut {

@@ -11,7 +11,7 @@ use crate::kernel::geom::{Curve, Side, Surface};
 use crate::kernel::job::Job;
 use crate::model::document::{Document, Shape};
 use crate::model::healing;
-use crate::model::spec::Piece;
+use crate::model::spec::{PatchSpec, Piece};
 use crate::view::pick::Target;
 
 struct Walk {
@@ -625,4 +625,24 @@ fn every_prompt_names_tool_task_and_keys() {
         assert!(prompt.contains("Esc "), "{prompt}");
         assert!(!prompt.contains('\u{2014}') && !prompt.ends_with('.'), "{prompt}");
     }
+}
+
+#[test]
+fn a_side_that_no_longer_crosses_its_neighbours_is_not_offered_a_trim() {
+    let mut w = Walk::on_tiles();
+    let with_fourth_at = |w: &mut Walk, x: f64| {
+        let line = |a: (f64, f64), b: (f64, f64)| vec![Piece::Line((a.0, a.1, 0.0), (b.0, b.1, 0.0))];
+        let sides = [
+            line((0.2, 0.5), (2.8, 0.5)),
+            line((0.5, 0.2), (0.5, 2.8)),
+            line((0.2, 2.5), (2.8, 2.5)),
+            line((x, 0.2), (x, 2.8)),
+        ];
+        w.send(Event::StartWith(Box::new(PatchSpec { sides, ..PatchSpec::default() }), Box::default()));
+    };
+    with_fourth_at(&mut w, 2.5);
+    assert!(w.tool.corners().iter().all(|c| c.crossing.is_some()), "{:?}", w.tool.corners());
+    with_fourth_at(&mut w, 9.0);
+    let of_fourth = w.tool.corners().iter().filter(|c| c.sides.contains(&3)).collect::<Vec<_>>();
+    assert!(!of_fourth.is_empty() && of_fourth.iter().all(|c| c.crossing.is_none()), "{of_fourth:?}");
 }
