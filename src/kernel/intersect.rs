@@ -6,12 +6,15 @@
 
 use std::sync::Arc;
 
-use super::geom::Surface;
+use super::geom::{Aabb, Surface};
 use super::job::Job;
 use super::mesh::body::Body;
 use super::mesh_ssi::engine::{self, MeshSsiError, MeshSsiOptions, intersect_bodies};
+use super::mesh_ssi::solids::Solids;
 use super::ssi::clip::clip;
+use super::ssi::triple::{self, Size};
 use super::ssi::{self, Intersection, SsiError, SsiOptions};
+use super::tol::Tolerances;
 
 /// Which engine.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -59,11 +62,11 @@ pub fn intersect_with(
     let mut result = match engine {
         Engine::Bvh => {
             let (a, b) = (parametric(a)?, parametric(b)?);
-            ssi::intersect(&borrowed(&a), &borrowed(&b), &SsiOptions { tol, ..SsiOptions::default() }, job)?
+            ssi::engine::intersect(&borrowed(&a), &borrowed(&b), &SsiOptions { tol, ..SsiOptions::default() }, job)?
         }
         Engine::Mesh => intersect_bodies(a, b, &MeshSsiOptions { tol, ..MeshSsiOptions::default() }, job)?,
     };
-    clip_to_faces(&mut result, a.iter().chain(b));
+    finish(&mut result, a.iter().chain(b), job);
     Ok(result)
 }
 
@@ -77,15 +80,25 @@ pub fn intersect_every_pair(
     let mut result = match engine {
         Engine::Bvh => {
             let surfaces = parametric(bodies)?;
-            ssi::intersect_all(&borrowed(&surfaces), &SsiOptions { tol, ..SsiOptions::default() }, job)?
+            ssi::pairs::every_pair(&borrowed(&surfaces), &SsiOptions { tol, ..SsiOptions::default() }, job)?
         }
         Engine::Mesh => engine::intersect_all(bodies, &MeshSsiOptions { tol, ..MeshSsiOptions::default() }, job)?,
     };
-    clip_to_faces(&mut result, bodies.iter());
+    finish(&mut result, bodies.iter(), job);
     Ok(result)
 }
 
-/// Both engines work on whole surfaces; of a face the part inside its loops counts.
+/// Both engines work on whole surfaces; of a face the part inside its loops counts. What is left is cut where three
+/// bodies meet.
+fn finish<'a>(result: &mut Intersection, bodies: impl Iterator<Item = &'a (usize, Body)> + Clone, job: &Job) {
+    clip_to_faces(result, bodies.clone());
+    if bodies.clone().count() > 2 && result.curves.len() > 1 {
+        let bounds = bodies.clone().fold(Aabb::EMPTY, |all, (_, body)| all.union(&body.bounds()));
+        let size = Size::of(&bounds, Tolerances::of(&bounds).gap);
+        triple::cut(result, &Solids::new(bodies), size, job);
+    }
+}
+
 fn clip_to_faces<'a>(result: &mut Intersection, bodies: impl Iterator<Item = &'a (usize, Body)> + Clone) {
     clip(result, &|number| {
         bodies.clone().find_map(|(n, body)| match body {

@@ -67,7 +67,7 @@ pub fn closed_directions(surface: &Surface) -> Closed {
 }
 
 /// Brings parameters back into the domain: around in closed directions, to the border in others.
-fn into_domain(uv: DVec2, domain: [[f64; 2]; 2], closed: Closed) -> DVec2 {
+pub(crate) fn into_domain(uv: DVec2, domain: [[f64; 2]; 2], closed: Closed) -> DVec2 {
     let mut uv = uv;
     for k in 0..2 {
         let [a, b] = domain[k];

@@ -9,7 +9,8 @@
 //! against one, a point is refined on the surface's side only, along the edge of the mesh on which it lies or in the
 //! plane of the triangle. `error_bound` is measured at the middle of every chord, on both sides.
 //!
-//! Branches of three different bodies meet in points (HJR99 4): see [`super::triple`].
+//! Branches of three different bodies meet in points (HJR99 4), which are found when curves have been cut down to faces:
+//! see [`crate::kernel::ssi::triple`].
 
 use std::time::Instant;
 
@@ -23,7 +24,6 @@ use super::refine::{Refined, Sheet as Touch, TANGENTIAL, refine};
 use super::sheet::Sheet;
 use super::topology::{Mesh, Point};
 use super::trace::Chain;
-use super::triple;
 use super::{MeshIntersection, intersect};
 use crate::kernel::geom::closest::{closed_directions, line_from};
 use crate::kernel::geom::{Aabb, Surface};
@@ -168,8 +168,6 @@ fn run(
         out.append(part);
     }
     out.curves = join(std::mem::take(&mut out.curves), JOINING * diagonal);
-    let all: Vec<(usize, &Sheet)> = bodies.iter().zip(&sheets).map(|((n, _), s)| (*n, s)).collect();
-    out.junctions.extend(triple::points(&out.curves, &all, JOINING * diagonal, job));
     out.complete &= out.unresolved.is_empty() && !job.is_cancelled();
     Ok(out)
 }

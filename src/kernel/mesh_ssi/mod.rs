@@ -9,9 +9,9 @@ pub mod perturbed;
 pub mod places;
 pub mod refine;
 pub mod sheet;
+pub mod solids;
 pub mod topology;
 pub mod trace;
-pub mod triple;
 
 use glam::DVec3;
 

@@ -8,9 +8,10 @@
 //! quadratically where the surfaces cross; where the normals are nearly parallel the method is undefined and
 //! says so, and the point is for the collinear-normal machinery.
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 
 use crate::kernel::geom::Surface;
+use crate::kernel::ssi::three::Touch;
 
 /// What a point is refined on.
 #[derive(Clone, Copy, Debug)]
@@ -68,33 +69,17 @@ pub const MAX_ITERATIONS: usize = 20;
 /// Normals closer than this (radians) count as parallel.
 pub const TANGENTIAL: f64 = 1e-4;
 
-/// Where a sheet is touched, its normal, and its partials.
-struct Touch {
-    point: DVec3,
-    normal: DVec3,
-    partials: Option<[DVec3; 2]>,
-}
-
 fn touch(sheet: &Sheet<'_>) -> Result<Touch, RefineError> {
     match sheet {
         Sheet::Plane(point, normal) => Ok(Touch { point: *point, normal: *normal, partials: None }),
-        Sheet::Surface(surface, uv) => {
-            let jet = surface.jet(*uv, 1);
-            let normal = jet.normal().ok_or(RefineError::Singular { uv: *uv })?;
-            Ok(Touch { point: jet.p(), normal, partials: Some([jet.u(), jet.v()]) })
-        }
+        Sheet::Surface(surface, uv) => Touch::of(surface, *uv).ok_or(RefineError::Singular { uv: *uv }),
     }
 }
 
 /// Moves a sheet's parameters so that its point follows `x` in the tangent plane ((22)-(26)).
 fn follow(sheet: &mut Sheet<'_>, touch: &Touch, x: DVec3) {
-    if let (Sheet::Surface(surface, uv), Some([u, v])) = (sheet, touch.partials) {
-        let delta = x - touch.point;
-        let (across_u, across_v) = (u.cross(touch.normal), v.cross(touch.normal));
-        let step = DVec2::new(across_v.dot(delta) / across_v.dot(u), across_u.dot(delta) / across_u.dot(v));
-        if step.is_finite() {
-            *uv = surface.clamped(*uv + step);
-        }
+    if let (Sheet::Surface(surface, uv), Some(step)) = (sheet, touch.step_to(x)) {
+        *uv = surface.clamped(*uv + step);
     }
 }
 
@@ -127,34 +112,6 @@ pub fn refine(mut a: Sheet<'_>, mut b: Sheet<'_>, tol: f64) -> Result<Refined, R
         }
         follow(&mut a, &p, x);
         follow(&mut b, &q, x);
-    }
-    Err(RefineError::NotConverged { gap, tol, iterations: MAX_ITERATIONS })
-}
-
-/// The point of three sheets: that in which their tangent planes meet, followed by the parameters of each, until all
-/// three are within `tol` of it. Returns the point, the parameters where there are any, and the largest distance left.
-pub fn refine_three(mut sheets: [Sheet<'_>; 3], tol: f64) -> Result<(DVec3, [Option<DVec2>; 3], f64), RefineError> {
-    let mut gap = f64::INFINITY;
-    for _ in 0..=MAX_ITERATIONS {
-        let touches = [touch(&sheets[0])?, touch(&sheets[1])?, touch(&sheets[2])?];
-        let normals = touches.each_ref().map(|t| t.normal);
-        let matrix = DMat3::from_cols(normals[0], normals[1], normals[2]).transpose();
-        let volume = matrix.determinant();
-        if volume.abs() < TANGENTIAL {
-            return Err(RefineError::Tangential { angle: volume.abs() });
-        }
-        let offsets = touches.each_ref().map(|t| t.normal.dot(t.point));
-        let x = matrix.inverse() * DVec3::from_array(offsets);
-        let off = |t: &Touch| if t.partials.is_some() { t.point.distance(x) } else { 0.0 };
-        let last = gap;
-        gap = touches.iter().map(off).fold(0.0, f64::max);
-        if gap <= tol || (gap < 100.0 * tol && gap >= 0.5 * last) {
-            let uv = |sheet: &Sheet<'_>| if let Sheet::Surface(_, uv) = sheet { Some(*uv) } else { None };
-            return Ok((x, sheets.each_ref().map(uv), gap));
-        }
-        for (sheet, touch) in sheets.iter_mut().zip(&touches) {
-            follow(sheet, touch, x);
-        }
     }
     Err(RefineError::NotConverged { gap, tol, iterations: MAX_ITERATIONS })
 }

@@ -12,8 +12,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::engine::{SsiError, SsiOptions, intersect};
+use super::engine::{self, SsiError, SsiOptions};
 use super::result::{CurveEnd, Intersection, IntersectionCurve, Unresolved};
+use super::three::Surfaces;
+use super::triple::{self, Size};
 use crate::kernel::geom::{Aabb, Surface};
 use crate::kernel::job::Job;
 
@@ -41,9 +43,47 @@ pub fn candidate_pairs(surfaces: &[(usize, &Surface)], reach: f64) -> Vec<[usize
     pairs
 }
 
+/// Intersects two sets of numbered surfaces. Where surfaces of one set cross on one of the other, the curves end in the
+/// point of all three.
+pub fn intersect(
+    a: &[(usize, &Surface)],
+    b: &[(usize, &Surface)],
+    options: &SsiOptions,
+    job: &Job,
+) -> Result<Intersection, SsiError> {
+    let mut found = engine::intersect(a, b, options, job)?;
+    cut_at_thirds(&mut found, &[a, b].concat(), options, job)?;
+    Ok(found)
+}
+
 /// Intersects every two of the numbered surfaces. In each point `a` is the surface that comes first in the list,
-/// except along a curve that was joined over several pairs.
+/// except along a curve that was joined over several pairs. Curves end in the points of three surfaces.
 pub fn intersect_all(
+    surfaces: &[(usize, &Surface)],
+    options: &SsiOptions,
+    job: &Job,
+) -> Result<Intersection, SsiError> {
+    let mut found = every_pair(surfaces, options, job)?;
+    cut_at_thirds(&mut found, surfaces, options, job)?;
+    Ok(found)
+}
+
+fn cut_at_thirds(
+    found: &mut Intersection,
+    surfaces: &[(usize, &Surface)],
+    options: &SsiOptions,
+    job: &Job,
+) -> Result<(), SsiError> {
+    if surfaces.len() > 2 && found.curves.len() > 1 {
+        let bounds = surfaces.iter().fold(Aabb::EMPTY, |all, (_, s)| all.union(&s.bounds()));
+        let size = Size::of(&bounds, options.checked(&bounds)?.gap);
+        triple::cut(found, &Surfaces::new(surfaces.iter().copied()), size, job);
+    }
+    Ok(())
+}
+
+/// Every two of the surfaces without a look at third ones: curves may yet be cut down to faces before that.
+pub(crate) fn every_pair(
     surfaces: &[(usize, &Surface)],
     options: &SsiOptions,
     job: &Job,
@@ -72,7 +112,7 @@ pub fn intersect_all(
             };
             // A single pair reports its own progress; of several that run at once each counts when it is done.
             let inner = if pairs.len() == 1 { job.part(0.0, 1.0) } else { job.part(0.0, 0.0) };
-            let result = intersect(&[surfaces[i]], &[surfaces[j]], &own, &inner);
+            let result = engine::intersect(&[surfaces[i]], &[surfaces[j]], &own, &inner);
             let before = done.fetch_add((cost / total * STEPS) as u64, Ordering::Relaxed);
             job.progress(before as f64 / STEPS + cost / total);
             result
