@@ -215,9 +215,10 @@ fn three_bodies_meet_in_points() {
     let mesh = TriMesh::new(vec![p, q, s, r], vec![[0, 1, 2], [0, 2, 3]]).unwrap();
     let b = [(1, spline), (2, Body::from(Arc::new(Facets::of_mesh(mesh))))];
     let found = intersect_with(Engine::Mesh, &[(0, Body::from(bowl()))], &b, None, &Job::new()).unwrap();
-    assert_eq!(found.curves.len(), 2);
+    // The two walls cross the bowl's top, and each of the two curves is cut there.
+    assert_eq!(found.curves.len(), 4);
+    assert!(found.curves.iter().all(|c| c.end_ids.iter().flatten().count() == 1));
     let points: Vec<_> = found.junctions.iter().filter(|j| j.kind == JunctionKind::ThreeSurfaces).collect();
-    // The two walls cross the bowl's top, and each of the two curves has it.
     assert_eq!(points.len(), 2, "{points:?}");
     for j in points {
         assert!(j.xyz.distance(DVec3::Z) < 1e-10 && j.uv.length() < 1e-10, "{j:?}");
@@ -330,8 +331,9 @@ fn all_pairs_of_surfaces_and_a_mesh_are_intersected_and_written() {
     assert_eq!(chosen["curves"], named["curves"]);
     let curves = named["curves"].as_array().unwrap();
     let pairs: Vec<_> = curves.iter().map(|c| (c["points"][0]["a"].clone(), c["points"][0]["b"].clone())).collect();
-    assert_eq!(pairs, [(0.into(), 1.into()), (0.into(), 2.into()), (1.into(), 2.into())]);
-    // The three branches meet in one point, over (1.1, 0.9); each pair of bodies has it.
+    // The three branches meet in one point, over (1.1, 0.9), and are cut there; each pair of bodies has it.
+    let twice = |a: i32, b: i32| [(a.into(), b.into()), (a.into(), b.into())];
+    assert_eq!(pairs, [twice(0, 1), twice(0, 2), twice(1, 2)].concat());
     let junctions = named["junctions"].as_array().unwrap();
     assert_eq!(junctions.len(), 3);
     for junction in junctions {
@@ -339,9 +341,9 @@ fn all_pairs_of_surfaces_and_a_mesh_are_intersected_and_written() {
         assert!((junction["xyz"][1].as_f64().unwrap() - 0.9).abs() < 1e-9);
     }
     let written = io::open(&folder.join("curves.igs")).unwrap().document;
-    assert_eq!((written.curves().count(), written.surfaces().count()), (3, 2));
+    assert_eq!((written.curves().count(), written.surfaces().count()), (6, 2));
     let degrees: Vec<usize> = written.curves().map(|(_, c)| c.knots().degree()).collect();
-    assert_eq!(degrees, [3, 1, 1], "splines between surfaces, polylines on the mesh");
+    assert_eq!(degrees, [3, 3, 1, 1, 1, 1], "splines between surfaces, polylines on the mesh");
     for (_, curve) in written.curves() {
         for k in 0..=64 {
             let [from, to] = curve.domain();
@@ -349,10 +351,10 @@ fn all_pairs_of_surfaces_and_a_mesh_are_intersected_and_written() {
             assert!((p.x - 1.1).abs().min((p.y - 0.9).abs()) < 1e-6, "{p}");
         }
     }
-    // Curves on surfaces, of two directory lines each: both sides of the first, one of each of the others.
+    // Curves on surfaces, of two directory lines each: both sides of the first two, one of each of the others.
     let text = std::fs::read_to_string(folder.join("curves.igs")).unwrap();
     let on_surfaces = text.lines().filter(|l| l.as_bytes()[72] == b'D' && l.trim_start().starts_with("142 ")).count();
-    assert_eq!(on_surfaces, 2 * 4);
+    assert_eq!(on_surfaces, 2 * 8);
     // The exact engine says why it cannot.
     let output = patchwright(folder, &["intersect", "model.patchwright.ron", "--engine", "bvh"]);
     assert_eq!(output.status.code(), Some(2));

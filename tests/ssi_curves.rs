@@ -248,23 +248,28 @@ fn all_pairs_of_a_model_meet_in_curves_that_run_over_its_patches() {
     };
     let result = run(1);
     assert!(result.complete, "{:?}", result.unresolved.first());
-    // The floor meets the four walls in one closed curve; it was cut, and the walls end at their corners.
-    let rings: Vec<_> = result.curves.iter().filter(|c| c.closed).collect();
-    assert_eq!(rings.len(), 1);
-    for p in &rings[0].points {
-        let side = p.xyz.x.abs().max(p.xyz.y.abs());
-        assert!(
-            (side - 0.7).abs() < 1e-9 && (p.xyz.z - 0.2 * p.xyz.x * p.xyz.y - 0.1 * p.xyz.x * p.xyz.x).abs() < 1e-9
-        );
-        assert!(surfaces[p.a].eval(p.uv).distance(p.xyz) < 1e-12 && surfaces[p.b].eval(p.st).distance(p.xyz) < 1e-12);
+    // The floor meets the walls in a ring that ends where it meets their creases, and cuts these; it runs on where the
+    // floor was cut, which is smooth there.
+    let height = |p: DVec3| p.z - 0.2 * p.x * p.y - 0.1 * p.x * p.x;
+    let (ring, creases): (Vec<_>, Vec<_>) =
+        result.curves.iter().partition(|c| c.points.iter().all(|p| height(p.xyz).abs() < 1e-9));
+    assert_eq!((ring.len(), creases.len()), (4, 8));
+    for curve in ring {
+        assert_eq!(curve.ends, [CurveEnd::Junction; 2]);
+        for p in &curve.points {
+            assert!((p.xyz.x.abs().max(p.xyz.y.abs()) - 0.7).abs() < 1e-9);
+            assert!(
+                surfaces[p.a].eval(p.uv).distance(p.xyz) < 1e-12 && surfaces[p.b].eval(p.st).distance(p.xyz) < 1e-12
+            );
+        }
     }
-    // Everything else are the four corners of the walls; the floor is smooth where it was cut.
-    assert_eq!(
-        result.curves.len(),
-        5,
-        "{:?}",
-        result.curves.iter().map(|c| (c.kind, c.ends, c.points.len())).collect::<Vec<_>>()
-    );
+    for curve in creases {
+        assert!(curve.ends.contains(&CurveEnd::Boundary));
+        let j = curve.end_ids.iter().flatten().map(|&id| result.junctions[id]).next().unwrap();
+        assert!((j.xyz.truncate().abs() - 0.7).length() < 1e-12 && height(j.xyz).abs() < 1e-12);
+    }
+    // Three pairs of surfaces in each of the four corners.
+    assert_eq!(result.junctions.len(), 12);
     let mut other = run(3);
     other.time_ms = result.time_ms;
     assert_eq!(other, result, "for any number of threads");
@@ -336,7 +341,8 @@ fn intersect_takes_sets_one_set_or_the_whole_model() {
     let rest = json(&["--a", "4-5"]);
     assert_eq!(rest["curves"].as_array().unwrap().len(), 1);
     assert_eq!(rest["curves"][0]["closed"], true);
-    assert_eq!(json(&[])["curves"].as_array().unwrap().len(), 5);
+    // All pairs: the creases of the walls are curves, too, and the ring ends where it meets them.
+    assert_eq!(json(&[])["curves"].as_array().unwrap().len(), 12);
     for (arguments, code) in [(["--b", "1"], 2), (["--a", "9"], 2), (["--a", "x"], 2)] {
         let mut all = vec!["intersect", "model.igs"];
         all.extend(arguments);

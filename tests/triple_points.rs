@@ -97,7 +97,9 @@ fn three_planes_meet_in_one_point_and_their_lines_are_cut_there() {
         assert_eq!(p.len(), 1);
         assert!(p[0].distance(map.transform_point3(DVec3::new(0.1, -0.2, 0.05))) < 1e-14);
         assert_eq!((found.curves.len(), found.junctions.len()), (6, 3));
-        assert!(found.curves.iter().all(|c| c.ends.contains(&CurveEnd::Junction) && c.ends.contains(&CurveEnd::Boundary)));
+        assert!(
+            found.curves.iter().all(|c| c.ends.contains(&CurveEnd::Junction) && c.ends.contains(&CurveEnd::Boundary))
+        );
         for k in 0..3 {
             assert_eq!(found.curves.iter().filter(|c| c.end_ids.contains(&Some(k))).count(), 2);
         }
@@ -242,9 +244,8 @@ fn sheets_through_one_line_have_no_point_of_their_own() {
     let found = all(&fan);
     assert!(found.complete);
     assert_eq!((found.curves.len(), found.junctions.len()), (3, 0));
-    let pencil = [-0.4_f64, 0.1, 0.5].map(|h| {
-        sphere((0.49 + h * h).sqrt()).transformed(&DAffine3::from_translation(z * h)).transformed(&pose())
-    });
+    let pencil = [-0.4_f64, 0.1, 0.5]
+        .map(|h| sphere((0.49 + h * h).sqrt()).transformed(&DAffine3::from_translation(z * h)).transformed(&pose()));
     let found = all(&pencil);
     assert!(found.complete);
     assert_eq!((found.curves.len(), found.junctions.len()), (3, 0));
@@ -304,7 +305,8 @@ fn a_sphere_that_touches_the_line_of_two_planes_meets_it_in_two_points_one_or_no
 #[test]
 fn curves_that_run_on_over_a_shared_edge_have_no_junction_there_and_a_crease_has() {
     let floor = graph(3, |x, y| 0.2 * x * y + 0.1 * x * x);
-    let parts = [floor.restricted([-1.0, 0.1], [-1.0, 1.0]).unwrap(), floor.restricted([0.1, 1.0], [-1.0, 1.0]).unwrap()];
+    let parts =
+        [floor.restricted([-1.0, 0.1], [-1.0, 1.0]).unwrap(), floor.restricted([0.1, 1.0], [-1.0, 1.0]).unwrap()];
     let wall = square(DVec3::Y * 0.3, DVec3::X, DVec3::Z);
     let smooth = [parts[0].clone(), parts[1].clone(), wall.clone()];
     let found = all(&smooth);

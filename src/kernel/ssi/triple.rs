@@ -110,7 +110,8 @@ pub fn cut(result: &mut Intersection, bodies: &impl Bodies, size: Size, job: &Jo
             let own = &curve.points[(at.floor() as usize).min(curve.points.len() - 1)];
             let here = point.on(own);
             let end = stretch_end(curve, at);
-            let of_curve = |e: usize| !curve.closed && end == Some(e) && (at as usize + 1 == curve.points.len() || at == 0.0);
+            let of_curve =
+                |e: usize| !curve.closed && end == Some(e) && (at as usize + 1 == curve.points.len() || at == 0.0);
             if (0..2).any(|e| of_curve(e) && curve.ends[e] == CurveEnd::Junction) {
                 continue; // a contact of its own two surfaces
             }
@@ -166,8 +167,20 @@ fn stretch_end(curve: &IntersectionCurve, at: f64) -> Option<usize> {
     }
     let (k, n) = (at as usize, curve.points.len());
     let pair = |k: usize| curve.points.get(k).map(|p| (p.a, p.b));
-    let before = if k > 0 { pair(k - 1) } else if curve.closed { pair(n - 2) } else { None };
-    let after = if k + 1 < n { pair(k + 1) } else if curve.closed { pair(1) } else { None };
+    let before = if k > 0 {
+        pair(k - 1)
+    } else if curve.closed {
+        pair(n - 2)
+    } else {
+        None
+    };
+    let after = if k + 1 < n {
+        pair(k + 1)
+    } else if curve.closed {
+        pair(1)
+    } else {
+        None
+    };
     if after != pair(k) {
         Some(1)
     } else if before != pair(k) {
@@ -186,7 +199,8 @@ fn chords<'a>(curves: &'a [IntersectionCurve], bodies: &impl Bodies, size: Size)
         }
         let points = &curve.points;
         let last = points.len().saturating_sub(1);
-        let direction = |k: usize| points.get(k).zip(points.get(k + 1)).map(|(p, q)| (q.xyz - p.xyz).normalize_or_zero());
+        let direction =
+            |k: usize| points.get(k).zip(points.get(k + 1)).map(|(p, q)| (q.xyz - p.xyz).normalize_or_zero());
         let joins = |k: usize| points[k].a == points[k + 1].a && points[k].b == points[k + 1].b;
         // The tangent, where no second chord tells how the curve turns.
         let tangent = |p: &CurvePoint| {
@@ -234,7 +248,11 @@ fn search(curves: &[IntersectionCurve], bodies: &impl Bodies, size: Size, job: &
     let seeker = Seeker { bodies, size };
     let found: Vec<Vec<Found>> = pairs
         .par_iter()
-        .map(|&[k, m]| if job.is_cancelled() { Vec::new() } else { seeker.points(chords[k as usize], chords[m as usize]) })
+        .map(
+            |&[k, m]| {
+                if job.is_cancelled() { Vec::new() } else { seeker.points(chords[k as usize], chords[m as usize]) }
+            },
+        )
         .collect();
     (!job.is_cancelled()).then(|| found.into_iter().flatten().collect())
 }
@@ -376,7 +394,8 @@ impl<B: Bodies> Seeker<'_, B> {
         let mut roots: Vec<f64> = Vec::new();
         for pair in samples.windows(2) {
             if let [Some((s, h)), Some((t, i))] = pair[..]
-                && !zero(h) && !zero(i)
+                && !zero(h)
+                && !zero(i)
                 && (h < 0.0) != (i < 0.0)
             {
                 roots.extend(crossing(&at, [s, t], h));

@@ -150,7 +150,17 @@ mod tests {
         ]);
         let request = Request::new(&Picks::new(Task::Pairs, &[]), &model).unwrap();
         let found = compute(&request, &Job::new()).unwrap();
-        assert_eq!(found.result.curves.len(), 3);
+        // Each line is cut where the third plane crosses it, and each piece can be kept as a curve.
+        assert_eq!(found.result.curves.len(), 6);
+        let kept = super::super::keep::curves(&found, 0..6);
+        assert!(kept.notes.is_empty());
+        for (_, curve) in &kept.curves {
+            let [from, to] = curve.domain();
+            assert!(
+                [from, to].iter().any(|&t| curve.eval(t).length() < 1e-14),
+                "it starts or ends in the point of all"
+            );
+        }
         assert!(found.result.complete);
         assert_eq!(found.numbers(), [0, 1, 2]);
         assert!(request.name().contains("4 bodies"));
