@@ -271,6 +271,41 @@ fn arcs_that_only_cut_the_corners_of_a_patch_are_found() {
     }
 }
 
+/// Between two of its traced points a curve may leave a patch by a little and come back: a circle whose top lies just
+/// above a knot line, and a parabola whose vertex does.
+#[test]
+fn curves_that_reach_over_a_knot_line_by_a_little_are_followed_beyond_it() {
+    let plane = rectangle(2.0, 2.0, 0.0);
+    let knotted = |s: &Surface, at: [f64; 2]| {
+        let s = s.knot_inserted(Direction::U, at[0], 1).unwrap();
+        s.knot_inserted(Direction::V, at[1], 1).unwrap()
+    };
+    let tol = 1e-5;
+    for k in 0..24 {
+        let over = 3e-3 * 0.7_f64.powi(k);
+        let x = 0.03 * f64::from(k % 7) - 0.08;
+        let circle = graph(3, |u, v| (u - x).powi(2) + v * v - 0.49);
+        let parabola = graph(3, |u, v| v - over + (0.02 + 0.1 * over) * (u - x).powi(2));
+        for (name, surface, length) in [
+            ("circle", knotted(&circle, [0.31, 0.7 - over]), Some(std::f64::consts::TAU * 0.7)),
+            ("parabola", knotted(&parabola, [0.31, 0.0]), None),
+        ] {
+            let options = SsiOptions { tol: Some(tol), ..SsiOptions::default() };
+            let found = intersect(&[(0, &surface)], &[(1, &plane)], &options, &Job::new()).unwrap();
+            let what = format!("{name} over by {over:.1e}");
+            assert!(found.complete && found.curves.len() == 1, "{what}: {} curves", found.curves.len());
+            let c = &found.curves[0];
+            assert!(c.error_bound <= tol && c.points.len() < 2000, "{what}: {:.1e}, {}", c.error_bound, c.points.len());
+            assert_eq!(c.closed, length.is_some(), "{what}: {:?} {} {:?} {:?}", c.ends, c.points.len(), c.points[0], c.points.last());
+            let run: f64 = c.points.windows(2).map(|w| w[0].xyz.distance(w[1].xyz)).sum();
+            assert!(length.is_none_or(|l| (run - l).abs() < 1e-3), "{what}: {run}");
+            for p in &c.points {
+                assert!(p.xyz.distance(plane.eval(p.st)) < 1e-9 && p.xyz.distance(surface.eval(p.uv)) < 1e-9, "{what}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_curve_may_run_into_a_pole() {
     // A plane through the axis of the nose.

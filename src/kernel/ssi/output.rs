@@ -183,7 +183,8 @@ fn curve(engine: &Engine, tracer: &Tracer<'_>, bounds: &mut Bounds, chain: &Chai
         let mut stack = vec![(*from, *to, 0)];
         while let Some((x, y, depth)) = stack.pop() {
             let here = within(&x, &y);
-            if here <= wanted || depth == DEEPEST || x.p.distance(y.p) < 1e-9 {
+            // Ends that are off their surfaces are no better where the chord is shorter.
+            if here <= wanted || x.off.max(y.off) > wanted || depth == DEEPEST || x.p.distance(y.p) < 1e-9 {
                 bound = bound.max(here);
                 push(&y);
                 continue;

@@ -273,13 +273,11 @@ impl Tracer<'_> {
             };
             let length = current.p.distance(next.p);
             bend = std::array::from_fn(|k| (next.rates[k] - current.rates[k]) / length);
-            let exit = self.exit(mode, &current, &next);
-            let (ends, leaving) = match exit {
-                Ok(None) => (vec![middle, next], false),
-                Ok(Some(node)) => (vec![node], true),
-                Err(()) => {
+            let (ends, beyond) = match self.inside(mode, [&current, &middle, &next]) {
+                Ok(ends) => ends,
+                Err(outside) => {
                     // Along a border: change over to the piece beyond where it is.
-                    if let Some(k) = self.drifts(&current, &next)
+                    if let Some(k) = self.drifts(&current, &outside)
                         && let Some(beyond) = self.cross(mode, &current, k)
                         && hops < 12
                     {
@@ -290,7 +288,7 @@ impl Tracer<'_> {
                         continue;
                     }
                     // The border is met at a shallow angle: come closer first.
-                    h = 0.3 * current.p.distance(next.p);
+                    h = 0.3 * current.p.distance(outside.p);
                     if h < 1e-9 {
                         return (out, End::Unresolved("the border of a patch is met at too shallow an angle"));
                     }
@@ -298,10 +296,12 @@ impl Tracer<'_> {
                 }
             };
             // A curve that bends outwards on the border itself makes no way: it leaves here.
-            if leaving && ends[0].p.distance(current.p) < 1e-10 {
-                let x = next.at.to_array();
-                let beyond = |k: &usize| (x[*k] - 1.0).max(-x[*k]);
-                let k = (0..4).max_by(|i, j| beyond(i).total_cmp(&beyond(j))).unwrap_or(0);
+            if let Some(beyond) = beyond
+                && ends[0].p.distance(current.p) < 1e-10
+            {
+                let x = beyond.at.to_array();
+                let off = |k: &usize| (x[*k] - 1.0).max(-x[*k]);
+                let k = (0..4).max_by(|i, j| off(i).total_cmp(&off(j))).unwrap_or(0);
                 hops += 1;
                 if hops > 12 {
                     return (out, End::Unresolved("the curve runs to and fro across a border"));
@@ -328,7 +328,7 @@ impl Tracer<'_> {
                 current = node;
                 out.push(node);
             }
-            if !leaving {
+            if beyond.is_none() {
                 hops = 0;
             } else if travelled > 1e-7 && self.meets(&current, &start) {
                 out.push(start);
@@ -439,9 +439,74 @@ impl Tracer<'_> {
         })
     }
 
+    /// The points of a step as far as it stays in the pair of pieces, the last on the border where it leaves it, and then
+    /// a point of it beyond. The error is that point, where the border cannot be met.
+    fn inside(&self, mode: Mode, step: [&TraceNode; 3]) -> Result<(Vec<TraceNode>, Option<TraceNode>), TraceNode> {
+        let mut ends = Vec::with_capacity(2);
+        for pair in step.windows(2) {
+            let (from, mut to, mut left) = (pair[0], *pair[1], None);
+            // Before the border where it was seen to leave it may have left and come back.
+            for _ in 0..4 {
+                let Some(beyond) = self.outside(mode, from, &to) else { break };
+                let Some(last) = self.exit(mode, from, &beyond).map_err(|()| beyond)? else { break };
+                (to, left) = (last, Some(beyond));
+            }
+            ends.push(to);
+            if left.is_some() {
+                return Ok((ends, left));
+            }
+        }
+        Ok((ends, None))
+    }
+
+    /// A point of the arc between two points of a pair of pieces that lies outside of it: the second, or one where the
+    /// interpolant turns back to the pair.
+    fn outside(&self, mode: Mode, from: &TraceNode, to: &TraceNode) -> Option<TraceNode> {
+        let out = |x: f64| !(-SLACK..=1.0 + SLACK).contains(&x);
+        let (x, y) = (from.at.to_array(), to.at.to_array());
+        if y.iter().any(|&v| out(v)) {
+            return Some(*to);
+        }
+        let h = from.p.distance(to.p);
+        (0..4).find_map(|k| {
+            // The most that a cubic is off its chord.
+            let bulge = 4.0 / 27.0 * h * (from.rates[k].abs() + to.rates[k].abs());
+            let slope = (y[k] - x[k]).abs();
+            if x[k].max(y[k]) + bulge + slope <= 1.0 && x[k].min(y[k]) - bulge - slope >= 0.0 {
+                return None;
+            }
+            // Where the interpolant a f^3 + b f^2 + c f + x is level.
+            let (c, d) = (h * from.rates[k], h * to.rates[k]);
+            let (a, b) = (c + d - 2.0 * (y[k] - x[k]), 3.0 * (y[k] - x[k]) - 2.0 * c - d);
+            let root = (b * b - 3.0 * a * c).sqrt();
+            let q = -(b + b.signum() * root);
+            [q / (3.0 * a), c / q].into_iter().filter(|f| (0.0..1.0).contains(f)).find_map(|f| {
+                let at = hermite(from, to, f);
+                if !out(at.to_array()[k]) {
+                    return None;
+                }
+                let pair = [from.pa, from.pb];
+                let pieces = (&self.sides[0].pieces[pair[0]], &self.sides[1].pieces[pair[1]]);
+                let point = 0.5 * (pieces.0.jet1(at.uv).p + pieces.1.jet1(at.st).p);
+                let direction = (to.p - from.p).normalize_or_zero();
+                let node = self.locate(mode, pair, at, Condition::Plane { point, direction }, direction)?;
+                out(node.at.to_array()[k]).then_some(node)
+            })
+        })
+    }
+
     /// Where the step leaves the pair of pieces, if it does.
     fn exit(&self, mode: Mode, from: &TraceNode, to: &TraceNode) -> Result<Option<TraceNode>, ()> {
         let (x0, x1) = (from.at.to_array(), to.at.to_array());
+        // From a border inwards it may come back to that border.
+        let fraction = |k: usize, bound: f64| {
+            let inwards = (x0[k] - bound).abs() <= SLACK && (bound - 0.5) * from.rates[k] < 0.0;
+            match inwards {
+                true => 1.0,
+                false if x1[k] == x0[k] => 0.0,
+                false => ((bound - x0[k]) / (x1[k] - x0[k])).clamp(0.0, 1.0),
+            }
+        };
         let mut first: Option<(f64, usize, f64)> = None;
         for k in 0..4 {
             let bound = if x1[k] > 1.0 + SLACK {
@@ -451,7 +516,7 @@ impl Tracer<'_> {
             } else {
                 continue;
             };
-            let f = if x1[k] == x0[k] { 0.0 } else { ((bound - x0[k]) / (x1[k] - x0[k])).clamp(0.0, 1.0) };
+            let f = fraction(k, bound);
             if first.is_none_or(|(g, ..)| f < g) {
                 first = Some((f, k, bound));
             }
@@ -476,7 +541,7 @@ impl Tracer<'_> {
             }
             let j = worst.0;
             let bound = if x[j] > 1.0 { 1.0 } else { 0.0 };
-            candidate = (((bound - x0[j]) / (x1[j] - x0[j])).clamp(0.0, 1.0), j, bound);
+            candidate = (fraction(j, bound), j, bound);
         }
         Err(())
     }
