@@ -296,7 +296,15 @@ fn curves_that_reach_over_a_knot_line_by_a_little_are_followed_beyond_it() {
             assert!(found.complete && found.curves.len() == 1, "{what}: {} curves", found.curves.len());
             let c = &found.curves[0];
             assert!(c.error_bound <= tol && c.points.len() < 2000, "{what}: {:.1e}, {}", c.error_bound, c.points.len());
-            assert_eq!(c.closed, length.is_some(), "{what}: {:?} {} {:?} {:?}", c.ends, c.points.len(), c.points[0], c.points.last());
+            assert_eq!(
+                c.closed,
+                length.is_some(),
+                "{what}: {:?} {} {:?} {:?}",
+                c.ends,
+                c.points.len(),
+                c.points[0],
+                c.points.last()
+            );
             let run: f64 = c.points.windows(2).map(|w| w[0].xyz.distance(w[1].xyz)).sum();
             assert!(length.is_none_or(|l| (run - l).abs() < 1e-3), "{what}: {run}");
             for p in &c.points {

@@ -100,9 +100,9 @@ pub fn cut(result: &mut Intersection, bodies: &impl Bodies, size: Size, job: &Jo
     let mut cuts: BTreeMap<usize, Vec<Cut>> = BTreeMap::new();
     // More than three bodies may meet in one point: a pair has one junction there.
     let mut of_pair: HashMap<[usize; 2], Vec<usize>> = HashMap::new();
-    for point in points {
-        let ends = point.passes.iter().filter(|(c, at)| stretch_end(&result.curves[*c], *at).is_some()).count();
-        if point.passes.len() < 2 || (ends == 2 && point.passes.len() == 2) {
+    let arms = arms(&result.curves, &points, 2.0 * size.same);
+    for (point, arms) in points.iter().zip(arms) {
+        if point.passes.len() < 2 || arms < 3 {
             continue;
         }
         for &(number, at) in &point.passes {
@@ -158,6 +158,47 @@ pub fn cut(result: &mut Intersection, bodies: &impl Bodies, size: Size, job: &Jo
         });
         result.curves.extend(split(curve, &cuts, size.same));
     }
+}
+
+/// How many curves leave each point, all patches that meet there counted: where two do, one runs on.
+fn arms(curves: &[IntersectionCurve], points: &[Point], same: f64) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    order.sort_by(|&i, &j| points[i].met.xyz.x.total_cmp(&points[j].met.xyz.x).then(i.cmp(&j)));
+    let place = |k: usize| points[order[k]].met.xyz;
+    let mut out = vec![0; points.len()];
+    for k in 0..order.len() {
+        let within = |&l: &usize| (place(l).x - place(k).x).abs() <= same;
+        let before = (0..k).rev().take_while(within);
+        let all = before.chain(k..order.len()).take_while(|l| *l < k || within(l));
+        let here = all.filter(|&l| place(l).distance(place(k)) <= same);
+        let mut passes: Vec<(usize, f64)> = here.flat_map(|l| points[order[l]].passes.iter().copied()).collect();
+        passes.sort_by(|x, y| x.0.cmp(&y.0).then(x.1.total_cmp(&y.1)));
+        passes.dedup();
+        let mut ends: HashMap<(usize, usize), usize> = HashMap::new();
+        for (curve, at) in passes {
+            match stretch_end(&curves[curve], at) {
+                None => out[order[k]] += 2,
+                Some(_) => *ends.entry((curve, stretch_start(&curves[curve], at as usize))).or_default() += 1,
+            }
+        }
+        // A stretch that both starts and ends here is a corner of patches that the curve passes.
+        out[order[k]] += ends.values().filter(|&&count| count == 1).count();
+    }
+    out
+}
+
+/// The first point of the stretch of a curve on one pair of patches.
+fn stretch_start(curve: &IntersectionCurve, at: usize) -> usize {
+    let pair = |k: usize| (curve.points[k].a, curve.points[k].b);
+    let before = |k: usize| if k > 0 { Some(k - 1) } else { curve.closed.then_some(curve.points.len() - 2) };
+    let mut first = at;
+    for _ in 0..curve.points.len() {
+        match before(first).filter(|&k| pair(k) == pair(first)) {
+            Some(k) => first = k,
+            None => break,
+        }
+    }
+    first
 }
 
 /// Whether a place is an end (0: the start, 1) of a stretch of a curve on one pair of patches.
@@ -363,9 +404,21 @@ impl<B: Bodies> Seeker<'_, B> {
             return None;
         }
         let near = |k: usize| curve.points[k].xyz.distance(x) <= self.size.same;
+        // Of several points that are one, the end of a stretch stands for all.
+        let settled = |k: usize| {
+            let (mut low, mut high) = (k, k);
+            while low > 0 && joins(low - 1) && near(low - 1) {
+                low -= 1;
+            }
+            while high <= last && joins(high) && near(high + 1) {
+                high += 1;
+            }
+            let end = [high, low].into_iter().find(|&k| stretch_end(curve, k as f64).is_some());
+            end.unwrap_or(k) as f64
+        };
         let place = match () {
-            () if near(at) => at as f64,
-            () if near(at + 1) => (at + 1) as f64,
+            () if near(at) => settled(at),
+            () if near(at + 1) => settled(at + 1),
             () => at as f64 + best.1,
         };
         // The last point of a ring is its first.
