@@ -152,7 +152,7 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         keep_only(&mut document, only)?;
     }
     let gpu = Gpu::headless()?;
-    let mut scene = Scene::default();
+    let mut scene = Scene::only_seen();
     scene.show_whole_surfaces(args.show.contains(&Show::Untrimmed));
     scene.sync(&document);
     let view = view(args, &document, &mut scene)?;

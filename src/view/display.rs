@@ -245,6 +245,17 @@ pub struct DisplayCurve {
     pub t: Vec<f64>,
 }
 
+/// How much of a display is there; each has what the ones before it have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Extent {
+    /// The triangles of a large mesh: it is seen.
+    Triangles,
+    /// The lines as well: it is seen as it is.
+    Lines,
+    /// The trees as well: it can be picked.
+    All,
+}
+
 /// One entity as triangles and lines, at one level of detail.
 #[derive(Clone, Debug)]
 pub struct Display {
@@ -252,28 +263,28 @@ pub struct Display {
     pub chord_tol: f64,
     /// The triangles; none for a curve.
     pub mesh: Arc<SurfaceMesh>,
-    /// The tree over them.
+    /// The tree over them; empty unless all is there.
     pub tree: TriTree,
     /// Borders first, then iso-lines; or the one free curve.
     pub curves: Vec<DisplayCurve>,
-    /// The tree over the segments of `curves`.
+    /// The tree over the segments of `curves`; empty unless all is there.
     pub segments: SegmentTree,
     /// A box around triangles and lines.
     pub bounds: Aabb,
     /// Whether a cap made it coarser than `chord_tol`.
     pub capped: bool,
-    /// Whether tree and curves are still to come: the first display of a large mesh.
-    pub quick: bool,
+    /// How much of it is there.
+    pub extent: Extent,
 }
 
 impl Display {
-    /// Makes it. Costs about a microsecond a vertex; meant for a worker when the model is large.
+    /// All of it. Costs about a microsecond a vertex; meant for a worker when the model is large.
     pub fn new(id: EntityId, geometry: &Geometry, chord_tol: f64) -> Self {
-        Self::on(id, geometry, chord_tol, None)
+        Self::up_to(Extent::All, id, geometry, chord_tol, None)
     }
 
-    /// The first display of a large mesh, which can be seen but not picked; all of it for everything else.
-    pub fn first(id: EntityId, geometry: &Geometry, chord_tol: f64) -> Self {
+    /// The first display: of a large mesh its triangles, of everything else what is wanted in the end.
+    pub fn first(extent: Extent, id: EntityId, geometry: &Geometry, chord_tol: f64) -> Self {
         match geometry {
             Geometry::Facets(facets) if facets.mesh().triangles().len() > QUICK => Self {
                 chord_tol,
@@ -283,14 +294,21 @@ impl Display {
                 segments: SegmentTree::new(Vec::new()),
                 bounds: facets.bounds(),
                 capped: false,
-                quick: true,
+                extent: Extent::Triangles,
             },
-            _ => Self::new(id, geometry, chord_tol),
+            _ => Self::up_to(extent, id, geometry, chord_tol, None),
         }
     }
 
-    /// The whole display, with the triangles of a quick one.
-    pub fn on(id: EntityId, geometry: &Geometry, chord_tol: f64, mesh: Option<Arc<SurfaceMesh>>) -> Self {
+    /// A display up to this extent; `mesh` are the triangles of one that was made before (of a mesh or block, whose
+    /// triangles are always the same).
+    pub fn up_to(
+        extent: Extent,
+        id: EntityId,
+        geometry: &Geometry,
+        chord_tol: f64,
+        mesh: Option<Arc<SurfaceMesh>>,
+    ) -> Self {
         let (mesh, curves, capped) = match geometry {
             Geometry::Surface(surface) => {
                 let (mesh, curves) = surface_display(id, surface, chord_tol);
@@ -313,8 +331,27 @@ impl Display {
             }
         };
         let bounds = Aabb::of(curves.iter().flat_map(|c| &c.points).chain(&mesh.points).copied());
-        let tree = TriTree::new(mesh.points.clone(), &mesh.triangles);
-        let segments = curves
+        let mut made = Self {
+            chord_tol,
+            mesh,
+            tree: TriTree::default(),
+            curves,
+            segments: SegmentTree::new(Vec::new()),
+            bounds,
+            capped,
+            extent,
+        };
+        if extent == Extent::All {
+            made.plant_trees();
+        }
+        made
+    }
+
+    /// Makes what picking needs.
+    fn plant_trees(&mut self) {
+        self.tree = TriTree::new(self.mesh.points.clone(), &self.mesh.triangles);
+        let segments = self
+            .curves
             .iter()
             .enumerate()
             .flat_map(|(k, c)| {
@@ -325,12 +362,17 @@ impl Display {
                 })
             })
             .collect();
-        Self { chord_tol, mesh, tree, curves, segments: SegmentTree::new(segments), bounds, capped, quick: false }
+        self.segments = SegmentTree::new(segments);
     }
 
     /// The number of triangles.
     pub fn triangle_count(&self) -> usize {
         self.mesh.triangles.len()
+    }
+
+    /// The number of line segments.
+    pub fn segment_count(&self) -> usize {
+        self.curves.iter().map(|c| c.points.len().saturating_sub(1)).sum()
     }
 }
 

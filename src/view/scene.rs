@@ -9,9 +9,10 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
-use super::display::{CurveRef, Display, Geometry};
+use super::display::{CurveRef, Display, Extent, Geometry};
 use super::viewport::View;
 use crate::kernel::geom::Aabb;
+use crate::kernel::mesh::tri_tree::first_hit;
 use crate::model::document::{Document, Entity, EntityId, Shape};
 
 /// How far triangles and lines may be from the truth, in pixels.
@@ -79,8 +80,10 @@ pub struct Request {
     pub geometry: Geometry,
     /// The chord tolerance.
     pub chord_tol: f64,
-    /// The quick display that is to be completed.
-    pub quick: Option<Arc<Display>>,
+    /// How much of it.
+    pub extent: Extent,
+    /// The display of less extent that is to be completed.
+    pub begun: Option<Arc<Display>>,
 }
 
 /// A display that was made.
@@ -94,9 +97,10 @@ pub struct Made {
 impl Request {
     /// Does the work.
     pub fn run(self) -> Made {
-        let display = match self.quick {
-            Some(quick) => Display::on(self.id, &self.geometry, self.chord_tol, Some(Arc::clone(&quick.mesh))),
-            None => Display::first(self.id, &self.geometry, self.chord_tol),
+        let (extent, id, geometry, tol) = (self.extent, self.id, &self.geometry, self.chord_tol);
+        let display = match self.begun {
+            Some(begun) => Display::up_to(extent, id, geometry, tol, Some(Arc::clone(&begun.mesh))),
+            None => Display::first(extent, id, geometry, tol),
         };
         Made { id: self.id, geometry: self.geometry, display: Arc::new(display) }
     }
@@ -111,9 +115,21 @@ pub struct Scene {
     whole_surfaces: bool,
     /// Whether that has changed since the last [`Scene::sync`].
     stale: bool,
+    /// Whether nothing will be picked.
+    only_seen: bool,
 }
 
 impl Scene {
+    /// A scene that is drawn and never picked from: no trees are made.
+    pub fn only_seen() -> Self {
+        Self { only_seen: true, ..Self::default() }
+    }
+
+    /// How much of a display is wanted in the end.
+    fn extent(&self) -> Extent {
+        if self.only_seen { Extent::Lines } else { Extent::All }
+    }
+
     /// Whether faces show as the whole surfaces under them.
     pub fn shows_whole_surfaces(&self) -> bool {
         self.whole_surfaces
@@ -211,11 +227,11 @@ impl Scene {
             let diagonal = item.bounds.diagonal();
             if item.geometry.is_fixed() || !(diagonal > 0.0 && diagonal.is_finite()) {
                 // A shape that is a point, or that is as it is: one display, whatever the view.
-                let quick = item.display.as_ref().is_some_and(|d| d.quick);
-                if item.display.is_none() || quick {
+                let begun = item.display.as_ref().map(|d| d.extent);
+                if begun.is_none_or(|extent| extent < self.extent()) {
                     let exact = FINEST * 1e-2 * if diagonal.is_finite() { diagonal } else { 1.0 };
                     // What is not seen at all comes before what cannot be picked yet.
-                    let rank = if quick { 1.0 } else { f64::INFINITY };
+                    let rank = if begun.is_some() { 1.0 } else { f64::INFINITY };
                     out.push((rank, self.request(item, exact.max(f64::MIN_POSITIVE))));
                 }
                 continue;
@@ -240,8 +256,9 @@ impl Scene {
     }
 
     fn request(&self, item: &Item, chord_tol: f64) -> Request {
-        let quick = item.display.clone().filter(|d| d.quick);
-        Request { id: item.id(), geometry: item.geometry.clone(), chord_tol, quick }
+        let extent = self.extent();
+        let begun = item.display.clone().filter(|d| d.extent < extent);
+        Request { id: item.id(), geometry: item.geometry.clone(), chord_tol, extent, begun }
     }
 
     /// Takes a display over; false when the document no longer has that shape.
@@ -280,7 +297,7 @@ impl Scene {
         self.items
             .iter()
             .filter_map(|item| item.display.as_ref())
-            .fold((0, 0), |(t, s), d| (t + d.triangle_count(), s + d.segments.len()))
+            .fold((0, 0), |(t, s), d| (t + d.triangle_count(), s + d.segment_count()))
     }
 }
 
@@ -303,8 +320,11 @@ fn smallest_pixel(item: &Item, view: &View) -> f64 {
     let hit = (0..9).filter_map(|k| {
         let pixel = size * DVec2::new(f64::from(k % 3), f64::from(k / 3)) * 0.5;
         let ray = view.ray(pixel);
-        let hit = display.tree.first_hit(ray.origin, ray.direction, f64::INFINITY)?;
-        Some(view.depth(ray.at(hit.t)))
+        let t = match display.extent {
+            Extent::All => display.tree.first_hit(ray.origin, ray.direction, f64::INFINITY)?.t,
+            _ => first_hit(&display.mesh.points, &display.mesh.triangles, ray.origin, ray.direction)?,
+        };
+        Some(view.depth(ray.at(t)))
     });
     let depth = seen.chain(hit).fold(f64::INFINITY, f64::min);
     if depth == f64::INFINITY { f64::INFINITY } else { view.pixel_size_at(depth).max(by_box) }
@@ -341,6 +361,28 @@ mod tests {
         let mut camera = Camera::default();
         camera.frame(&scene.bounds(), viewport);
         View::new(&camera, viewport, &scene.bounds())
+    }
+
+    /// `patchwright render` built the whole pick tree of a model that it only drew.
+    #[test]
+    fn what_is_only_seen_looks_the_same_and_has_no_trees() {
+        let mut pair = [Scene::default(), Scene::only_seen()];
+        for scene in &mut pair {
+            scene.sync(&document());
+            // Near enough for a finer display than the first one, by lines of sight.
+            let mut close = view(scene).camera;
+            close.distance *= 0.5;
+            let view = View::new(&close, Viewport::new(160.0, 120.0), &scene.bounds());
+            scene.refine(&view);
+            assert!(scene.wanted(&view).is_empty());
+        }
+        assert_eq!(pair[0].counts(), pair[1].counts());
+        for (picked, seen) in pair[0].items().iter().zip(pair[1].items()) {
+            let [picked, seen] = [picked, seen].map(|item| item.display.as_ref().unwrap());
+            assert_eq!((picked.mesh.points.len(), picked.chord_tol), (seen.mesh.points.len(), seen.chord_tol));
+            assert!(seen.tree.is_empty() && seen.segments.is_empty());
+            assert_eq!(picked.segments.len(), seen.segment_count());
+        }
     }
 
     #[test]

@@ -18,6 +18,7 @@ use patchwright::model::history::History;
 use patchwright::render::{Display, Emphasis, Gpu, Key, Look, Offscreen, Stage, VolumeItem};
 use patchwright::ui::{App, Options};
 use patchwright::view::camera::{Axis, Camera};
+use patchwright::view::display::Extent;
 use patchwright::view::inspect::{Coloring, Hierarchy, Shown, VolumeForm};
 use patchwright::view::scene::{Request, Scene};
 use patchwright::view::viewport::{View, Viewport};
@@ -52,7 +53,10 @@ fn scene(n: usize) -> Scene {
         let mut scene = Scene::default();
         scene.sync(&document);
         for item in scene.items().to_vec() {
-            scene.accept(Request { id: item.id(), geometry: item.geometry.clone(), chord_tol, quick: None }.run());
+            scene.accept(
+                Request { id: item.id(), geometry: item.geometry.clone(), chord_tol, extent: Extent::All, begun: None }
+                    .run(),
+            );
         }
         if scene.counts().0 >= 1_000_000 {
             return scene;

@@ -9,6 +9,7 @@ use glam::{DVec2, DVec3};
 use patchwright::kernel::geom::{Knots, Surface};
 use patchwright::model::document::{Document, Shape, Unit};
 use patchwright::view::camera::{Axis, Camera};
+use patchwright::view::display::Extent;
 use patchwright::view::pick::{Filter, PickOptions, pick, pick_all, under_cursor};
 use patchwright::view::scene::Scene;
 use patchwright::view::viewport::{View, Viewport};
@@ -51,7 +52,8 @@ fn main() {
             id: item.id(),
             geometry: item.geometry.clone(),
             chord_tol: 1.7e-3,
-            quick: None,
+            extent: Extent::All,
+            begun: None,
         };
         scene.accept(request.run());
     }

@@ -197,10 +197,16 @@ impl Facets {
     /// Its curves in a fixed order: the borders of a mesh and then its feature edges; the grid lines of a block,
     /// face by face, those of constant j first.
     pub fn curves(&self) -> &[FacetCurve] {
-        self.curves.get_or_init(|| match &self.grid {
+        if let Some(curves) = self.curves.get() {
+            return curves;
+        }
+        // Made before the lock is taken: the work is parallel, and a thread that waits for its parts may meanwhile take up
+        // other work that asks for these very curves. Whoever comes second throws equal ones away.
+        let made = match &self.grid {
             None => mesh_curves(&self.mesh),
             Some(grid) => grid_curves(grid),
-        })
+        };
+        self.curves.get_or_init(|| made)
     }
 }
 
@@ -360,6 +366,18 @@ mod tests {
             let points = disk.iter().enumerate().map(|(k, p)| *p * if k % 2 == 0 { 1.0 } else { 1.0 + jag }).collect();
             let facets = Facets::of_mesh(TriMesh::new(points, triangles.clone()).unwrap());
             assert_eq!(facets.curves().len(), 1, "jag {jag}");
+        }
+    }
+
+    /// The lock was held while parts of the work were given to other threads, which could ask for the same curves.
+    #[test]
+    fn curves_can_be_asked_for_from_within_parallel_work() {
+        use rayon::prelude::*;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+        for _ in 0..8 {
+            let facets = Facets::of_mesh(sheet(40, |i, j| i == 20 && j == 20));
+            let counts: Vec<usize> = pool.install(|| (0..24).into_par_iter().map(|_| facets.curves().len()).collect());
+            assert_eq!(counts, vec![8; 24]);
         }
     }
 

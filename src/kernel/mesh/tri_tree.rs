@@ -18,7 +18,7 @@ use glam::DVec3;
 use crate::kernel::geom::Aabb;
 
 pub use nearest::{Nearest, nearest_on_triangle};
-pub use rays::Hit;
+pub use rays::{Hit, first_hit};
 
 /// Deeper than any tree that is built.
 const STACK: usize = 96;

@@ -131,6 +131,15 @@ impl TriTree {
     }
 }
 
+/// The smallest t >= 0 at which a ray hits one of these triangles, found without a tree: for a few rays where nothing
+/// else needs one. O(n).
+pub fn first_hit(points: &[DVec3], triangles: &[[u32; 3]], origin: DVec3, direction: DVec3) -> Option<f64> {
+    let ray = Sheared::new(origin, direction);
+    let corner = |k: u32| points.get(k as usize).copied().unwrap_or(DVec3::NAN);
+    let hits = triangles.iter().filter_map(|&[a, b, c]| ray.hit(corner(a), corner(b), corner(c)));
+    hits.map(|(t, _)| t).filter(|&t| t >= 0.0).min_by(f64::total_cmp)
+}
+
 impl Node {
     /// Where the ray enters the box, `None` when it misses it or enters behind `end`.
     fn enter(&self, o: Vec3, inverse: Vec3, end: f32) -> Option<f32> {
@@ -245,6 +254,8 @@ mod tests {
                 );
                 let first = tree.first_hit(a, b - a, 1.0);
                 assert_eq!(first.map(|h| h.triangle), slow.first().map(|s| s.1));
+                let plain = super::first_hit(&points, &triangles, a, b - a).filter(|&t| t <= 1.0);
+                assert!(plain.zip(first).map_or(plain.is_none() && first.is_none(), |(t, h)| (t - h.t).abs() < 1e-9));
                 if let Some(h) = first {
                     seen += 1;
                     let [p, q, r] = triangles[h.triangle as usize].map(|i| points[i as usize]);
