@@ -51,24 +51,24 @@ fn fresh() -> u64 {
 /// A sphere as a latitude-longitude mesh.
 fn sphere(center: DVec3, radius: f32) -> Arc<MeshData> {
     let (nu, nv) = (96u32, 48u32);
-    let mut mesh = MeshData { origin: center, ..MeshData::default() };
+    let (mut positions, mut normals, mut triangles) = (Vec::new(), Vec::new(), Vec::new());
     for j in 0..=nv {
         for i in 0..=nu {
             let (u, v) = (i as f32 / nu as f32, j as f32 / nv as f32);
             let (a, b) = (u * std::f32::consts::TAU, (v - 0.5) * std::f32::consts::PI);
             let n = Vec3::new(a.cos() * b.cos(), a.sin() * b.cos(), b.sin());
-            mesh.positions.push((n * radius).to_array());
-            mesh.normals.push(n.to_array());
+            positions.push((n * radius).to_array());
+            normals.push(n.to_array());
         }
     }
     for j in 0..nv {
         for i in 0..nu {
             let k = j * (nu + 1) + i;
-            mesh.triangles.push([k, k + 1, k + nu + 2]);
-            mesh.triangles.push([k, k + nu + 2, k + nu + 1]);
+            triangles.push([k, k + 1, k + nu + 2]);
+            triangles.push([k, k + nu + 2, k + nu + 1]);
         }
     }
-    Arc::new(mesh)
+    Arc::new(MeshData::new(center, &positions, &normals, triangles))
 }
 
 fn item(entity: u64, mesh: Arc<MeshData>, hex: u32) -> MeshItem {
@@ -85,9 +85,13 @@ fn item(entity: u64, mesh: Arc<MeshData>, hex: u32) -> MeshItem {
 
 /// A square of side 2 in the plane z = 0, facing +z.
 fn square(center: DVec3) -> Arc<MeshData> {
-    let positions = vec![[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]];
-    let normals = vec![[0.0, 0.0, 1.0]; 4];
-    Arc::new(MeshData { origin: center, positions, normals, triangles: vec![[0, 1, 2], [0, 2, 3]] })
+    facing(center, 1.0, vec![[0, 1, 2], [0, 2, 3]])
+}
+
+/// Triangles of its corners, with normals along z.
+fn facing(center: DVec3, z: f32, triangles: Vec<[u32; 3]>) -> Arc<MeshData> {
+    let positions = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]];
+    Arc::new(MeshData::new(center, &positions, &[[0.0, 0.0, z]; 4], triangles))
 }
 
 fn line(entity: u64, points: &[DVec3], style: LineStyle) -> LineItem {
@@ -349,10 +353,7 @@ fn the_back_of_a_surface_is_told_from_its_front() {
     let mut frame = plan_view([100, 100]);
     frame.meshes.push(item(1, square(DVec3::ZERO), 0x8fb3d9));
     let Some(front) = render("front", &frame) else { return };
-    let mut turned = (*frame.meshes[0].mesh).clone();
-    turned.triangles = turned.triangles.iter().map(|&[a, b, c]| [a, c, b]).collect();
-    turned.normals = vec![[0.0, 0.0, -1.0]; 4];
-    frame.meshes[0] = item(1, Arc::new(turned), 0x8fb3d9);
+    frame.meshes[0] = item(1, facing(DVec3::ZERO, -1.0, vec![[0, 2, 1], [0, 3, 2]]), 0x8fb3d9);
     let Some(back) = render("back", &frame) else { return };
     let (f, b) = (front.get_pixel(50, 50).0, back.get_pixel(50, 50).0);
     assert!(f[2] > b[2].saturating_add(25), "{f:?} {b:?}");

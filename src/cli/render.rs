@@ -310,7 +310,7 @@ fn fill(camera: &mut Camera, viewport: Viewport, scene: &Scene, bounds: &Aabb, f
     let shown = scene.items().iter().filter(|item| item.visible() && framed(item.id()));
     let points: Vec<_> = shown
         .filter_map(|item| item.display.as_ref())
-        .flat_map(|d| d.curves.iter().flat_map(|c| &c.points).chain(&d.mesh.points))
+        .flat_map(|d| d.curves.iter().flat_map(|c| &c.points).chain(d.mesh.points.iter()))
         .collect();
     // Coming closer changes the perspective, which changes what fills the picture. Half steps (in powers) settle for
     // models that are deep along the line of sight too, where whole ones would overshoot.
@@ -410,7 +410,7 @@ mod tests {
         let view = View::new(&camera, viewport, &scene.bounds());
         let size = DVec2::new(viewport.width, viewport.height);
         let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-        for p in &scene.items()[0].display.as_ref().unwrap().mesh.points {
+        for p in scene.items()[0].display.as_ref().unwrap().mesh.points.iter() {
             let at = view.project(*p).unwrap().pixel / size;
             (low, high) = (low.min(at), high.max(at));
         }

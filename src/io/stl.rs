@@ -7,15 +7,18 @@
 use std::io::Read;
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::report::{ImportReport, Severity};
+use crate::kernel::mesh::soup::{self, Part};
 use crate::kernel::mesh::tri_mesh::{Group, TriMesh};
 use crate::kernel::mesh::weld::Welder;
 
 const HEADER: usize = 84;
 const RECORD: usize = 50;
-/// Triangles that are read at a time.
-const BATCH: usize = 1 << 14;
+/// Triangles that are sorted for welding at a time, and how many times as many are read at a time.
+const PART: usize = 1 << 15;
+const PARTS: usize = 4;
 
 /// Whether a file of this length that begins like this is an STL file.
 pub fn looks_like(beginning: &[u8], length: u64) -> bool {
@@ -74,8 +77,6 @@ fn skipped(report: &mut ImportReport, count: usize, why: &str) {
 struct Gatherer {
     welder: Welder,
     triangles: Vec<[u32; 3]>,
-    /// Space for the vertices of one batch.
-    numbers: Vec<u32>,
     groups: Vec<Group>,
     not_finite: usize,
     collapsed: usize,
@@ -87,7 +88,6 @@ impl Gatherer {
         Self {
             welder: Welder::with_capacity(triangles / 2 + 16),
             triangles: Vec::with_capacity(triangles),
-            numbers: Vec::new(),
             groups: Vec::new(),
             not_finite: 0,
             collapsed: 0,
@@ -109,28 +109,6 @@ impl Gatherer {
         }
     }
 
-    /// Adds triangles by their corners, three after three. `None` when their vertices cannot be numbered.
-    fn add_all(&mut self, corners: &[DVec3]) -> Option<()> {
-        self.numbers.clear();
-        if corners.iter().all(|p| p.is_finite()) {
-            self.welder.vertices(corners, &mut self.numbers)?;
-        } else {
-            let whole = corners.chunks_exact(3).filter(|c| c.iter().all(|p| p.is_finite()));
-            let finite: Vec<DVec3> = whole.flatten().copied().collect();
-            self.not_finite += (corners.len() - finite.len()) / 3;
-            self.welder.vertices(&finite, &mut self.numbers)?;
-        }
-        for corners in self.numbers.as_chunks().0 {
-            let &[a, b, c] = corners;
-            if a == b || b == c || c == a {
-                self.collapsed += 1;
-            } else {
-                self.triangles.push(*corners);
-            }
-        }
-        Some(())
-    }
-
     fn end_group(&mut self, name: String) {
         let start = self.groups.last().map_or(0, |g| g.triangles.end);
         self.groups.push(Group { name, triangles: start..self.triangles.len() });
@@ -145,8 +123,7 @@ impl Gatherer {
     }
 }
 
-/// Reads a binary file of this length, of which no more than two batches are in memory: while one is welded, the next one
-/// is read and decoded.
+/// Reads a binary file of this length: while one batch is sorted for welding the next one is read.
 pub fn read_binary(mut from: impl Read + Send, length: u64, report: &mut ImportReport) -> std::io::Result<TriMesh> {
     let mut header = [0_u8; HEADER];
     let header = &mut header[..HEADER.min(length as usize)];
@@ -159,34 +136,43 @@ pub fn read_binary(mut from: impl Read + Send, length: u64, report: &mut ImportR
             format!("the file declares {declared} triangles and holds {there}; those that are there were read");
         report.add(Severity::Warning, "STL header", None, None, reason);
     }
-    let mut left = declared.min(there);
-    let mut gatherer = Gatherer::new(left);
-    let (mut records, mut next, mut corners) = (Vec::new(), Vec::new(), Vec::new());
-    let mut read = |left: &mut usize, records: &mut Vec<u8>, corners: &mut Vec<DVec3>| {
-        let count = BATCH.min(*left);
-        *left -= count;
+    let count = declared.min(there);
+    let mut left = count.min(soup::MOST);
+    skipped(report, count - left, "beyond the number that can be welded");
+    let mut read = |records: &mut Vec<u8>| {
+        let count = left.min(PARTS * PART);
+        left -= count;
         records.resize(count * RECORD, 0);
-        from.read_exact(records)?;
-        corners.clear();
-        corners.extend(records.as_chunks::<RECORD>().0.iter().flat_map(|record| {
-            let float = |at: usize| f64::from(f32::from_le_bytes([0, 1, 2, 3].map(|k| record[at + k])));
-            [12, 24, 36].map(|at| DVec3::new(float(at), float(at + 4), float(at + 8)))
-        }));
-        std::io::Result::Ok(())
+        from.read_exact(records)
     };
-    read(&mut left, &mut records, &mut corners)?;
-    while !corners.is_empty() {
-        let (welded, done) = rayon::join(|| gatherer.add_all(&corners), || read(&mut left, &mut records, &mut next));
+    let (mut records, mut next, mut parts) = (Vec::new(), Vec::new(), Vec::new());
+    read(&mut records)?;
+    while !records.is_empty() {
+        let sort = || -> Vec<Part> { records.par_chunks(PART * RECORD).map(sorted).collect() };
+        let (sorted, done) = rayon::join(sort, || read(&mut next));
         done?;
-        if welded.is_none() {
-            report.add(Severity::Skipped, "STL", None, None, "it has more vertices than can be numbered (2^32)");
-            break;
-        }
-        std::mem::swap(&mut corners, &mut next);
+        parts.extend(sorted);
+        std::mem::swap(&mut records, &mut next);
     }
+    drop((records, next));
+    let welded = soup::weld(&parts);
+    drop(parts);
+    skipped(report, welded.not_finite, NOT_FINITE);
+    skipped(report, welded.collapsed, COLLAPSED);
+    let mut mesh = TriMesh::new(welded.points, welded.triangles).unwrap_or_default();
     let name = String::from_utf8_lossy(&header[..header.len().min(80)]);
-    gatherer.end_group(name.trim_matches(|c: char| c.is_whitespace() || c == '\0').to_owned());
-    Ok(gatherer.finish(report))
+    let name = name.trim_matches(|c: char| c.is_whitespace() || c == '\0').to_owned();
+    mesh.groups = vec![Group { name, triangles: 0..mesh.triangles().len() }];
+    Ok(mesh)
+}
+
+/// The triangles of some records of a binary file.
+fn sorted(records: &[u8]) -> Part {
+    let triangle = |record: &[u8; RECORD]| {
+        let float = |at: usize| f32::from_le_bytes([0, 1, 2, 3].map(|k| record[at + k]));
+        [12, 24, 36].map(|at| [float(at), float(at + 4), float(at + 8)])
+    };
+    Part::new(records.as_chunks::<RECORD>().0.iter().map(triangle))
 }
 
 fn read_ascii(bytes: &[u8], report: &mut ImportReport) -> TriMesh {

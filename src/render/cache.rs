@@ -1,40 +1,21 @@
 //! GPU buffers that follow the revisions of the data.
 //!
-//! Meshes are stored with their triangles in runs of [`RUN`] and a box for each run; lines and glyphs likewise. What
-//! no frame has asked for in the last [`KEEP`] frames is dropped.
+//! Meshes and lines are stored in runs with a box for each. What no frame has asked for in the last [`KEEP`] frames is dropped.
 
 use std::collections::HashMap;
-use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use wgpu::util::DeviceExt;
 
-use super::cull::Bounds;
-use super::frame::{Field, GlyphData, GlyphItem, Key, LineData, LineItem, MeshData, MeshItem, VolumeItem};
+use super::cull::{Bounds, Run};
+use super::frame::{Field, GlyphData, GlyphItem, Key, LineData, LineItem, MeshItem, VolumeItem};
+use super::mesh_data::MeshData;
 use super::volume::GpuVolumes;
 
-/// Triangles in one culled run.
-const RUN: usize = 4096;
 /// Line points in one culled run.
 const LINE_RUN: usize = 2048;
 /// Frames that unused buffers survive.
 const KEEP: u64 = 240;
-
-/// A run of indices or instances with the box around what it draws.
-#[derive(Clone, Debug)]
-pub(super) struct Run {
-    pub range: Range<u32>,
-    pub bounds: Bounds,
-}
-
-/// One vertex of a surface.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-pub(super) struct SurfaceVertex {
-    pub position: [f32; 3],
-    /// Signed normalized 16-bit.
-    pub normal: [i16; 4],
-}
 
 /// A mesh on the GPU.
 #[derive(Debug)]
@@ -112,6 +93,13 @@ impl<T> Table<T> {
     }
 }
 
+/// Where buffers are made and filled.
+#[derive(Clone, Copy)]
+pub(super) struct Device<'a> {
+    pub device: &'a wgpu::Device,
+    pub queue: &'a wgpu::Queue,
+}
+
 /// All buffers of one viewport.
 #[derive(Debug, Default)]
 pub(super) struct Cache {
@@ -139,13 +127,13 @@ impl Cache {
         }
     }
 
-    pub fn update_mesh(&mut self, device: &wgpu::Device, item: &MeshItem) {
-        let now = self.now;
-        self.rebuilt += self.meshes.update(item.key, item.revision, now, || GpuMesh::new(device, &item.mesh)) as usize;
+    pub fn update_mesh(&mut self, gpu: Device<'_>, item: &MeshItem) {
+        let (now, device) = (self.now, gpu.device);
+        self.rebuilt += self.meshes.update(item.key, item.revision, now, || GpuMesh::new(gpu, &item.mesh)) as usize;
         if let Some(field) = &item.field {
             // A new mesh under an old field revision must not meet the old field.
             let revision = field.revision ^ item.revision.rotate_left(32);
-            let count = item.mesh.positions.len();
+            let count = item.mesh.vertices.len();
             self.rebuilt += self.fields.update(item.key, revision, now, || field_buffer(device, field, count)) as usize;
         }
     }
@@ -202,33 +190,35 @@ fn field_buffer(device: &wgpu::Device, field: &Field, count: usize) -> Option<wg
     (count > 0).then(|| buffer(device, "field", &data, wgpu::BufferUsages::VERTEX))
 }
 
+/// Bytes that are on their way to the graphics card at a time.
+const CHUNK: usize = 1 << 24;
+
+/// A large buffer, copied in chunks: room for all of it at once is not cleared, filled and copied again.
+fn large_buffer<T: Pod>(gpu: Device<'_>, label: &str, data: &[T], usage: wgpu::BufferUsages) -> wgpu::Buffer {
+    let bytes: &[u8] = bytemuck::cast_slice(data);
+    if bytes.len() <= CHUNK {
+        return buffer(gpu.device, label, data, usage);
+    }
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size: bytes.len().next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT as usize) as u64,
+        usage: usage | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    for (k, chunk) in bytes.chunks(CHUNK).enumerate() {
+        gpu.queue.write_buffer(&buffer, (k * CHUNK) as u64, chunk);
+        gpu.queue.submit([]);
+    }
+    buffer
+}
+
 impl GpuMesh {
-    fn new(device: &wgpu::Device, mesh: &MeshData) -> Option<Self> {
-        let count = mesh.positions.len();
-        let vertex = |k: usize| {
-            let n = mesh.normals.get(k).copied().unwrap_or_default();
-            let length = (n[0] * n[0] + n[1] * n[1] + n[2] * n[2]).sqrt();
-            let scale = if length > 0.0 && length.is_finite() { 32767.0 / length } else { 0.0 };
-            let [x, y, z] = n.map(|c| (c * scale).round() as i16);
-            SurfaceVertex { position: mesh.positions[k], normal: [x, y, z, 0] }
-        };
-        let vertices: Vec<SurfaceVertex> = (0..count).map(vertex).collect();
-        let whole = |t: &&[u32; 3]| {
-            t.iter().all(|&k| mesh.positions.get(k as usize).is_some_and(|p| p.iter().all(|c| c.is_finite())))
-        };
-        let triangles: Vec<[u32; 3]> = mesh.triangles.iter().filter(whole).copied().collect();
-        let mut runs = Vec::new();
-        for (k, run) in triangles.chunks(RUN).enumerate() {
-            let bounds = Bounds::of(run.iter().flatten().map(|&v| &mesh.positions[v as usize]))?;
-            let start = (k * RUN * 3) as u32;
-            runs.push(Run { range: start..start + run.len() as u32 * 3, bounds });
-        }
-        let bounds = runs.iter().map(|r| r.bounds).reduce(Bounds::union)?;
+    fn new(gpu: Device<'_>, mesh: &MeshData) -> Option<Self> {
         Some(Self {
-            vertices: buffer(device, "surface vertices", &vertices, wgpu::BufferUsages::VERTEX),
-            indices: buffer(device, "surface indices", &triangles, wgpu::BufferUsages::INDEX),
-            runs,
-            bounds,
+            bounds: mesh.bounds?,
+            vertices: large_buffer(gpu, "surface vertices", &mesh.vertices, wgpu::BufferUsages::VERTEX),
+            indices: large_buffer(gpu, "surface indices", &mesh.triangles, wgpu::BufferUsages::INDEX),
+            runs: mesh.runs.clone(),
         })
     }
 }

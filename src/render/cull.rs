@@ -3,6 +3,8 @@
 //! The planes are read off the rows of projection x model-view (Gribb and Hartmann 2001); a box is outside when it
 //! lies wholly behind one plane. Conservative: a box may be kept in vain, never dropped in vain.
 
+use std::ops::Range;
+
 use glam::{Mat4, Vec3, Vec4};
 
 /// An axis-aligned box as centre and half extent.
@@ -29,6 +31,13 @@ impl Bounds {
         let max = (self.center + self.half).max(other.center + other.half);
         Self { center: (min + max) * 0.5, half: (max - min) * 0.5 }
     }
+}
+
+/// A run of indices or instances with the box around what it draws.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Run {
+    pub range: Range<u32>,
+    pub bounds: Bounds,
 }
 
 /// Left, right, bottom, top and near plane. There is no far plane: reversed depth may have it at infinity.

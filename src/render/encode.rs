@@ -9,9 +9,9 @@ use std::sync::Arc;
 
 use glam::{DMat4, Mat4, Vec3};
 
-use super::cache::{Cache, Run};
+use super::cache::Cache;
 use super::color::{Color, ColorScale, MAX_STEPS, mix};
-use super::cull::{Bounds, Frustum, Side};
+use super::cull::{Bounds, Frustum, Run, Side};
 use super::frame::{
     Dash, Display, Emphasis, FrameData, Hidden, LineItem, LineRole, LineStyle, MeshItem, VolumeForm, VolumeItem,
 };

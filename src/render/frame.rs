@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::{DMat4, DVec3};
 
 use super::color::{Color, ColorScale, srgb};
+use super::mesh_data::MeshData;
 use crate::view::rounded_box::RoundedBox;
 
 /// Names one thing that has buffers on the GPU. Meshes, lines and glyphs have separate name spaces.
@@ -168,20 +169,6 @@ pub enum Emphasis {
     Hovered,
     /// Chosen: in the accent colour.
     Selected,
-}
-
-/// Triangles with normals, relative to an origin.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct MeshData {
-    /// Model position of the local (0, 0, 0).
-    pub origin: DVec3,
-    /// Vertices relative to the origin.
-    pub positions: Vec<[f32; 3]>,
-    /// One normal per vertex, of any length; a zero normal makes the triangle's own normal stand in. Empty: flat.
-    pub normals: Vec<[f32; 3]>,
-    /// Three indices per triangle, counter-clockwise seen from the side of the normal. Neighbours in the list should
-    /// be neighbours in space: the list is culled in runs.
-    pub triangles: Vec<[u32; 3]>,
 }
 
 /// One number per vertex, shown in colour.

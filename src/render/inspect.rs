@@ -5,7 +5,8 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::color::{Color, ColorScale, srgb};
-use super::frame::{Emphasis, Field, Key, MeshData, MeshItem, VolumeData, VolumeForm, VolumeItem};
+use super::frame::{Emphasis, Field, Key, MeshItem, VolumeData, VolumeForm, VolumeItem};
+use super::mesh_data::MeshData;
 use crate::view::colormap::Sequential;
 use crate::view::inspect::{Scale, Shown, TorusMesh};
 
@@ -65,12 +66,9 @@ impl MeshItem {
 
     /// Tori in one colour.
     pub fn of_torus(key: Key, revision: u64, tori: &TorusMesh, color: Color, origin: DVec3) -> Self {
-        let mesh = MeshData {
-            origin,
-            positions: tori.points.iter().map(|p| (*p - origin).as_vec3().to_array()).collect(),
-            normals: tori.normals.iter().map(|n| n.as_vec3().to_array()).collect(),
-            triangles: tori.triangles.clone(),
-        };
+        let positions: Vec<[f32; 3]> = tori.points.iter().map(|p| (*p - origin).as_vec3().to_array()).collect();
+        let normals: Vec<[f32; 3]> = tori.normals.iter().map(|n| n.as_vec3().to_array()).collect();
+        let mesh = MeshData::new(origin, &positions, &normals, tori.triangles.clone());
         let (mesh, emphasis) = (Arc::new(mesh), Emphasis::Normal);
         Self { key, revision, mesh, color, emphasis, field: None, sectioned: true }
     }

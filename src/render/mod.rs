@@ -17,6 +17,7 @@ mod encode;
 mod frame;
 mod gpu;
 mod inspect;
+mod mesh_data;
 mod offscreen;
 mod renderer;
 mod sketch;
@@ -30,13 +31,14 @@ pub use color::{Color, ColorScale, MAX_STEPS, PALETTE, mix, srgb, to_srgb8, with
 pub use encode::FrameStats;
 pub use frame::{
     Background, CameraData, Dash, Display, Emphasis, Field, FrameData, Glyph, GlyphData, GlyphItem, GlyphShape, Hidden,
-    Key, LineData, LineItem, LineRole, LineStyle, MeshData, MeshItem, Section, VolumeData, VolumeForm, VolumeItem,
+    Key, LineData, LineItem, LineRole, LineStyle, MeshItem, Section, VolumeData, VolumeForm, VolumeItem,
 };
 pub use gpu::{Gpu, GpuError};
 pub use inspect::{BODIES, THIN};
+pub use mesh_data::MeshData;
 pub use offscreen::{Offscreen, OffscreenError};
 pub use renderer::{Renderer, shader_sources};
 pub use sketch::Sketch;
-pub use stage::{Coloring, Look, Stage};
+pub use stage::{Coloring, Look, Prepared, Stage};
 pub use theme::Theme;
 pub use viewport::Viewport;

@@ -5,8 +5,9 @@ use std::borrow::Cow;
 use bytemuck::{Pod, Zeroable};
 use wgpu::{BlendState, CompareFunction, ShaderStages, TextureFormat, VertexFormat};
 
-use super::cache::{GlyphInstance, LINE_POINT, SurfaceVertex};
+use super::cache::{GlyphInstance, LINE_POINT};
 use super::color::MAX_STEPS;
+use super::mesh_data::SurfaceVertex;
 use super::target::{COLOR_FORMAT, DEPTH_FORMAT, SAMPLES};
 use super::volume::{Template, TemplateVertex, VolumeInstance};
 

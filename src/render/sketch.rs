@@ -7,8 +7,9 @@ use glam::DVec3;
 use super::color::{Color, srgb, with_alpha};
 use super::frame::{
     Dash, Emphasis, Field, FrameData, GlyphData, GlyphItem, GlyphShape, Hidden, Key, LineData, LineItem, LineRole,
-    LineStyle, MeshData, MeshItem,
+    LineStyle, MeshItem,
 };
+use super::mesh_data::MeshData;
 use crate::view::intersection::Drawing;
 use crate::view::intersection::style::{Mark, Stroke};
 
@@ -86,8 +87,8 @@ impl Sketch {
         if triangles.is_empty() {
             return;
         }
-        let positions = points.iter().map(|p| (*p - self.origin).as_vec3().to_array()).collect();
-        let mesh = MeshData { origin: self.origin, positions, normals, triangles };
+        let positions: Vec<[f32; 3]> = points.iter().map(|p| (*p - self.origin).as_vec3().to_array()).collect();
+        let mesh = MeshData::new(self.origin, &positions, &normals, triangles);
         let item = MeshItem {
             key: self.key(),
             revision: self.revision,

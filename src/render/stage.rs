@@ -10,14 +10,15 @@ use glam::DVec3;
 
 use super::color::{Color, PALETTE, mix, srgb, with_alpha};
 use super::frame::{
-    CameraData, Dash, Display, Emphasis, FrameData, Hidden, Key, LineData, LineItem, LineRole, LineStyle, MeshData,
-    MeshItem, Section,
+    CameraData, Dash, Display, Emphasis, FrameData, Hidden, Key, LineData, LineItem, LineRole, LineStyle, MeshItem,
+    Section,
 };
+use super::mesh_data::{MeshData, Threads};
 use super::theme::Theme;
 use crate::kernel::mesh::tessellate::SurfaceMesh;
 use crate::model::document::EntityId;
 use crate::view::display::Display as Shown;
-use crate::view::scene::{Item, ItemKind, Scene};
+use crate::view::scene::{Item, ItemKind, Made, Scene};
 use crate::view::section::SectionPlane;
 use crate::view::viewport::View;
 
@@ -94,7 +95,32 @@ impl CameraData {
     }
 }
 
+/// The triangles of a display, packed in a worker.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    id: EntityId,
+    shown: Arc<SurfaceMesh>,
+    mesh: Option<Arc<MeshData>>,
+}
+
+impl Prepared {
+    /// Packs the triangles of a display on all threads; not for the window's thread.
+    pub fn new(made: &Made) -> Self {
+        let shown = made.display();
+        Self { id: made.id(), shown: Arc::clone(&shown.mesh), mesh: pack(shown, Threads::All) }
+    }
+}
+
 impl Stage {
+    /// Takes over triangles that were packed elsewhere; the next frame that shows them need not do it.
+    pub fn accept(&mut self, prepared: Prepared) {
+        let Prepared { id, shown, mesh } = prepared;
+        if self.dressed.get(&id).is_none_or(|dressed| !Arc::ptr_eq(&dressed.shown, &shown)) {
+            // No display has revision 0, so lines and cap are made when it is drawn.
+            self.dressed.insert(id, Dressed { revision: 0, shown, mesh, borders: None, isolines: None, cap: None });
+        }
+    }
+
     /// A frame of the visible items of a scene. `emphasis` says how much each stands out.
     pub fn frame(
         &mut self,
@@ -214,21 +240,20 @@ fn color_of(item: &Item, at: usize, look: &Look) -> Color {
     }
 }
 
+/// The point that the vertices and lines of a display are given from.
+fn origin(shown: &Shown) -> DVec3 {
+    if shown.bounds.is_empty() { DVec3::ZERO } else { shown.bounds.center() }
+}
+
+fn pack(shown: &Shown, threads: Threads) -> Option<Arc<MeshData>> {
+    let there = !shown.mesh.triangles.is_empty();
+    there.then(|| Arc::new(MeshData::of_surface(origin(shown), &shown.mesh, threads)))
+}
+
 /// Triangles and lines for a frame; `mesh` where the triangles are those of before.
 fn dress(revision: u64, shown: &Shown, mesh: Option<Arc<MeshData>>) -> Dressed {
-    let origin = if shown.bounds.is_empty() { DVec3::ZERO } else { shown.bounds.center() };
-    let local = |p: &DVec3| (*p - origin).as_vec3().to_array();
-    let made = || {
-        (!shown.mesh.triangles.is_empty()).then(|| {
-            Arc::new(MeshData {
-                origin,
-                positions: shown.mesh.points.iter().map(local).collect(),
-                normals: shown.mesh.normals.iter().map(|n| n.as_vec3().to_array()).collect(),
-                triangles: shown.mesh.triangles.clone(),
-            })
-        })
-    };
-    let mesh = mesh.or_else(made);
+    let origin = origin(shown);
+    let mesh = mesh.or_else(|| pack(shown, Threads::One));
     let lines = |iso: bool| {
         let mut lines = LineData::new(origin);
         for curve in shown.curves.iter().filter(|c| c.curve.is_iso() == iso) {

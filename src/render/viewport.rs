@@ -2,8 +2,9 @@
 //! `paint` copies it into the window's own pass.
 
 use std::sync::Arc;
+use std::time::Instant;
 
-use super::cache::Cache;
+use super::cache::{Cache, Device};
 use super::encode::{FrameStats, Groups, Plan};
 use super::frame::FrameData;
 use super::renderer::{FrameUniform, ITEM_STRIDE, ItemUniform, Renderer, SCALE_STRIDE, ScaleUniform};
@@ -92,9 +93,10 @@ impl Viewport {
             return None;
         }
         self.shown = Some(frame.clone());
+        let start = Instant::now();
         self.cache.begin();
         for item in &frame.meshes {
-            self.cache.update_mesh(device, item);
+            self.cache.update_mesh(Device { device, queue }, item);
         }
         for item in &frame.lines {
             self.cache.update_lines(device, item);
@@ -104,6 +106,9 @@ impl Viewport {
         }
         for item in &frame.volumes {
             self.cache.update_volumes(device, item);
+        }
+        if self.cache.rebuilt > 0 {
+            log::debug!("{} buffers made in {:.1?}", self.cache.rebuilt, start.elapsed());
         }
         let size = self.resize(device, frame.size);
         let mut plan = Plan::new(frame, size, &self.cache);

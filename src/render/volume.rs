@@ -8,8 +8,8 @@ use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
 use wgpu::util::DeviceExt;
 
-use super::cache::Run;
 use super::cull::Bounds;
+use super::cull::Run;
 use super::frame::VolumeData;
 
 /// Volumes in one culled run.

@@ -11,13 +11,14 @@ use super::actions::{ACTIONS, Action};
 use super::autosave::Autosave;
 use super::dialogs::{Answer, Dialog, Then};
 use super::editor::{Editor, Page};
-use super::files::Files;
+use super::files::{Files, file_name};
 use super::hints::{self, Hints};
 use super::numpad::{Listener, Numpad};
 use super::palette;
 use super::panels::defects::DefectSearch;
 use super::panels::uv::{self, UvView};
 use super::settings::Settings;
+use super::startup::{Clock, Startup};
 use super::tools::Tool;
 use super::viewport::Viewport;
 use super::{bars, panels, status, theme};
@@ -26,7 +27,6 @@ use crate::model::command::Command;
 use crate::model::history::History;
 use crate::model::selection::Selection;
 use crate::view::pick::Filter;
-use crate::work::Jobs;
 
 /// How the editor starts.
 #[derive(Clone, Debug, Default)]
@@ -57,6 +57,7 @@ impl Options {
 /// # Errors
 /// The reason in one line when no window or no graphics adapter is to be had.
 pub fn run(files: Vec<PathBuf>) -> Result<(), String> {
+    let startup = Startup::begin(files.clone());
     let options = Options::of_user(files);
     let native = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
@@ -77,7 +78,7 @@ pub fn run(files: Vec<PathBuf>) -> Result<(), String> {
     let note = Arc::clone(&opened);
     let make: eframe::AppCreator<'_> = Box::new(move |cc| {
         note.store(true, Ordering::Relaxed);
-        Ok(Box::new(App::new(cc, options)))
+        Ok(Box::new(App::begun(cc, options, startup)))
     });
     let app = eframe::create_native("Patchwright", native, make, &event_loop);
     event_loop.run_app(&mut Listener { app, numpad }).map_err(|error| failed(&error))?;
@@ -95,23 +96,32 @@ pub struct App {
     pub editor: Editor,
     hints: Option<Arc<Mutex<hints::State>>>,
     numpad: Numpad,
+    clock: Clock,
+    device: Option<wgpu::Device>,
 }
 
 impl App {
     /// An editor in `cc`'s window.
     pub fn new(cc: &eframe::CreationContext<'_>, options: Options) -> Self {
+        let startup = Startup::begin(options.files.clone());
+        Self::begun(cc, options, startup)
+    }
+
+    /// An editor in `cc`'s window whose files are on their way.
+    fn begun(cc: &eframe::CreationContext<'_>, options: Options, startup: Startup) -> Self {
         let ctx = &cc.egui_ctx;
         theme::install(ctx);
         let settings = options.settings.as_deref().map(Settings::load).unwrap_or_default();
-        let wake = ctx.clone();
+        let viewport = Viewport::new(cc.wgpu_render_state.as_ref());
+        let (jobs, opening, clock) = startup.enter(ctx);
         let mut editor = Editor {
             history: History::new(crate::model::document::Document::default(), true),
             selection: Selection::default(),
             files: Files::default(),
-            jobs: Jobs::new(move || wake.request_repaint()),
+            jobs,
             settings,
             settings_path: options.settings,
-            viewport: Viewport::new(cc.wgpu_render_state.as_ref()),
+            viewport,
             tool: Tool::Select,
             pickable: Filter { iso_lines: true, ..Filter::ALL },
             pick_list: None,
@@ -130,16 +140,16 @@ impl App {
             autosave: options.journal.as_ref().map(Autosave::start).unwrap_or_default(),
         };
         editor.apply_settings(ctx);
-        if options.files.is_empty() {
-            editor.open_first_example();
-        } else {
-            editor.open_now(options.files);
+        match (opening, options.files.first()) {
+            (Some(opening), Some(first)) => editor.await_opening(&file_name(first), opening),
+            _ => editor.open_first_example(),
         }
         if let Some(journal) = &options.journal {
             editor.offer_recovery(journal.recoverable());
         }
         let hints = options.hints.map(|path| Hints::install(ctx, path));
-        Self { editor, hints, numpad: options.numpad }
+        let device = cc.wgpu_render_state.as_ref().map(|state| state.device.clone());
+        Self { editor, hints, numpad: options.numpad, clock, device }
     }
 
     /// Shortcuts of the active tool first, then those of the actions.
@@ -323,6 +333,10 @@ impl eframe::App for App {
             ctx.request_repaint_after(Duration::from_millis(60));
         }
         self.hint(&ctx);
+        if self.clock.runs() {
+            let entities = self.editor.document().entities().len();
+            self.clock.follow(entities, self.editor.viewport.scene.counts().0, &ctx, self.device.as_ref());
+        }
         self.editor.viewport.note_frame_time(start.elapsed());
     }
 }

@@ -11,12 +11,25 @@ use crate::model::document::Document;
 use crate::model::history::History;
 use crate::model::replay::spec_of;
 use crate::view::intersection::{Found, keep};
-use crate::work::{Lane, Outcome, Ticket};
+use crate::work::{Jobs, Lane, Outcome, Ticket};
 
 /// What reading some files came to.
-struct Read {
+pub struct Read {
     paths: Vec<PathBuf>,
     result: Result<(Document, ImportReport), String>,
+}
+
+/// Files on their way.
+pub type Opening = Ticket<Read>;
+
+/// Has files read by a worker; `None` without a file.
+pub fn begin(jobs: &mut Jobs, paths: Vec<PathBuf>) -> Option<Opening> {
+    let name = file_name(paths.first()?);
+    let input = paths.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join("\n");
+    Some(jobs.spawn(Lane::Heavy, format!("Open {name}"), input, move |job| {
+        let result = read(&paths, job);
+        Read { paths, result }
+    }))
 }
 
 /// What writing a file came to.
@@ -41,7 +54,7 @@ pub struct Files {
     pub source: Option<PathBuf>,
     /// What is being exported.
     pub exporting: Option<Ticket<Result<(PathBuf, Saved), String>>>,
-    opening: Option<Ticket<Read>>,
+    opening: Option<Opening>,
     saving: Option<(Ticket<Written>, Option<Then>)>,
 }
 
@@ -71,13 +84,15 @@ impl Editor {
     pub fn open_now(&mut self, paths: Vec<PathBuf>) {
         let Some(first) = paths.first() else { return };
         let name = file_name(first);
-        let input = paths.iter().map(|p| p.display().to_string()).collect::<Vec<_>>().join("\n");
-        let ticket = self.jobs.spawn(Lane::Heavy, format!("Open {name}"), input, move |job| {
-            let result = read(&paths, job);
-            Read { paths, result }
-        });
+        if let Some(opening) = begin(&mut self.jobs, paths) {
+            self.await_opening(&name, opening);
+        }
+    }
+
+    /// Files are on their way.
+    pub fn await_opening(&mut self, name: &str, opening: Opening) {
         self.say(format!("Opening {name}…"));
-        self.files.opening = Some(ticket);
+        self.files.opening = Some(opening);
     }
 
     /// Writes the document to its file, or asks where to.

@@ -17,6 +17,7 @@ pub mod paint;
 mod palette;
 mod panels;
 mod settings;
+mod startup;
 mod status;
 mod theme;
 mod tools;

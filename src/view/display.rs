@@ -330,7 +330,7 @@ impl Display {
                 (mesh, facet_curves(id, facets), false)
             }
         };
-        let bounds = Aabb::of(curves.iter().flat_map(|c| &c.points).chain(&mesh.points).copied());
+        let bounds = Aabb::of(curves.iter().flat_map(|c| &c.points).chain(mesh.points.iter()).copied());
         let mut made = Self {
             chord_tol,
             mesh,
@@ -349,7 +349,7 @@ impl Display {
 
     /// Makes what picking needs.
     fn plant_trees(&mut self) {
-        self.tree = TriTree::new(self.mesh.points.clone(), &self.mesh.triangles);
+        self.tree = TriTree::new(self.mesh.points.to_vec(), &self.mesh.triangles);
         let segments = self
             .curves
             .iter()

@@ -5,8 +5,10 @@
 //! corners differ. Meshes above [`LARGE`] triangles get one normal a vertex: there a crease is a pixel wide.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use crate::kernel::mesh::tessellate::SurfaceMesh;
 use crate::kernel::mesh::tri_mesh::TriMesh;
@@ -22,16 +24,27 @@ pub(super) fn shaded(mesh: &TriMesh) -> SurfaceMesh {
 }
 
 fn smooth(mesh: &TriMesh) -> SurfaceMesh {
-    let mut normals = vec![DVec3::ZERO; mesh.points().len()];
-    for (t, corners) in mesh.triangles().iter().enumerate() {
-        let area = mesh.area_vector(t);
-        corners.iter().for_each(|&k| normals[k as usize] += area);
-    }
-    normals.iter_mut().for_each(|n| *n = n.normalize_or_zero());
+    let (points, triangles) = (mesh.points(), mesh.triangles());
+    let shared = mesh.shared();
+    // Sums of squares of the model's size stay within the range of f32.
+    let scale = mesh.bounds().diagonal().max(f64::MIN_POSITIVE).recip();
+    // Two halves, whatever the number of threads, so that the sums are always the same.
+    let half = |own: &[[u32; 3]]| {
+        let mut sums = vec![Vec3::ZERO; points.len()];
+        for &[a, b, c] in own {
+            let [p, q, r] = [a, b, c].map(|k| points[k as usize]);
+            let area = (scale * (q - p)).cross(scale * (r - p)).as_vec3();
+            [a, b, c].into_iter().for_each(|k| sums[k as usize] += area);
+        }
+        sums
+    };
+    let (first, second) = triangles.split_at(triangles.len() / 2);
+    let (sums, others) = rayon::join(|| half(first), || half(second));
+    let unit = |(a, b): (&Vec3, &Vec3)| (a.as_dvec3() + b.as_dvec3()).normalize_or_zero();
     SurfaceMesh {
-        points: mesh.points().to_vec(),
-        normals,
-        triangles: mesh.triangles().to_vec(),
+        points: shared.0,
+        normals: sums.par_iter().zip(&others).map(unit).collect(),
+        triangles: shared.1,
         ..SurfaceMesh::default()
     }
 }
@@ -54,10 +67,10 @@ fn creased(mesh: &TriMesh) -> SurfaceMesh {
         }
     }
     let cosine = CREASE.to_radians().cos();
-    let mut out = SurfaceMesh::default();
+    let (mut points, mut normals) = (Vec::new(), Vec::new());
     let mut made: HashMap<(u32, [i16; 3]), u32> = HashMap::with_capacity(mesh.points().len());
-    for (t, corners) in mesh.triangles().iter().enumerate() {
-        out.triangles.push(corners.map(|k| {
+    let corners = |(t, corners): (usize, &[u32; 3])| {
+        corners.map(|k| {
             let near = &around[first[k as usize] as usize..first[k as usize + 1] as usize];
             let alike = near.iter().filter(|&&o| units[o as usize].dot(units[t]) >= cosine);
             let sum: DVec3 = alike.map(|&o| areas[o as usize]).sum();
@@ -65,13 +78,14 @@ fn creased(mesh: &TriMesh) -> SurfaceMesh {
             let rounded = (normal * 1000.0).round();
             let key = (k, [rounded.x as i16, rounded.y as i16, rounded.z as i16]);
             *made.entry(key).or_insert_with(|| {
-                out.points.push(mesh.points()[k as usize]);
-                out.normals.push(normal);
-                out.points.len() as u32 - 1
+                points.push(mesh.points()[k as usize]);
+                normals.push(normal);
+                points.len() as u32 - 1
             })
-        }));
-    }
-    out
+        })
+    };
+    let triangles: Vec<[u32; 3]> = mesh.triangles().iter().enumerate().map(corners).collect();
+    SurfaceMesh { points: Arc::new(points), normals, triangles: Arc::new(triangles), ..SurfaceMesh::default() }
 }
 
 #[cfg(test)]

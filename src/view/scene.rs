@@ -94,6 +94,18 @@ pub struct Made {
     display: Arc<Display>,
 }
 
+impl Made {
+    /// Of which entity.
+    pub fn id(&self) -> EntityId {
+        self.id
+    }
+
+    /// What was made.
+    pub fn display(&self) -> &Arc<Display> {
+        &self.display
+    }
+}
+
 impl Request {
     /// Does the work.
     pub fn run(self) -> Made {
@@ -448,7 +460,7 @@ mod tests {
         let view = view(&scene);
         scene.refine(&view);
         let display = scene.items()[0].display.clone().unwrap();
-        for t in &display.mesh.triangles {
+        for t in display.mesh.triangles.iter() {
             let center: DVec3 = t.iter().map(|&k| display.mesh.points[k as usize]).sum::<DVec3>() / 3.0;
             let pixel = view.pixel_size_at(view.depth(center));
             assert!(1.0 - center.length() < PIXELS * pixel);

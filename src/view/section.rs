@@ -112,7 +112,7 @@ impl SectionPlane {
     pub fn cap_line(&self, mesh: &SurfaceMesh) -> Vec<[DVec3; 2]> {
         let heights: Vec<f64> = mesh.points.iter().map(|&p| self.height(p)).collect();
         let mut out = Vec::new();
-        for t in &mesh.triangles {
+        for t in mesh.triangles.iter() {
             let h = t.map(|k| heights[k as usize]);
             let p = t.map(|k| mesh.points[k as usize]);
             let mut ends = [DVec3::ZERO; 2];

@@ -12,6 +12,7 @@
 //! triangulation could not keep are counted in [`FaceMesh::lost`].
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 use spade::handles::{DirectedEdgeHandle, FaceHandle, InnerTag};
@@ -198,12 +199,13 @@ pub fn tessellate_face(face: &Face, options: &TessellateOptions, extra: &[Vec<f6
     let triangles = triangulated(&places, &segments, &mut vertices, &mut out.lost, &lines, surface);
     let mesh = &mut out.mesh;
     mesh.uv = vertices.iter().map(|c| c.uv).collect();
-    mesh.points = vertices.iter().map(|c| c.point).collect();
+    mesh.points = Arc::new(vertices.iter().map(|c| c.point).collect());
     mesh.normals = vertices.iter().map(|c| normal(surface, c.uv)).collect();
-    (mesh.triangles, out.collapsed) = triangles.into_iter().partition(|t| {
+    let (whole, collapsed) = triangles.into_iter().partition(|t| {
         let [a, b, c] = t.map(|k| mesh.points[k as usize]);
         a != b && b != c && c != a
     });
+    (mesh.triangles, out.collapsed) = (Arc::new(whole), collapsed);
     fill_normals(mesh);
     mesh.capped = capped;
     mesh.lines = lines;
@@ -224,7 +226,7 @@ fn fill_normals(mesh: &mut SurfaceMesh) {
     if mesh.normals.iter().all(|n| *n != DVec3::ZERO) {
         return;
     }
-    for t in &mesh.triangles {
+    for t in mesh.triangles.iter() {
         let [a, b, c] = t.map(|k| mesh.points[k as usize]);
         let n = (b - a).cross(c - a).normalize_or_zero();
         for k in t.map(|k| k as usize) {
@@ -413,7 +415,7 @@ mod tests {
         let made = tessellate_face(face, &TessellateOptions::new(tol), &[Vec::new(), Vec::new()]);
         assert_eq!(made.lost, 0);
         let slack = 1e-9 * area(&made.mesh);
-        for t in &made.mesh.triangles {
+        for t in made.mesh.triangles.iter() {
             let [a, b, c] = t.map(|k| made.mesh.points[k as usize]);
             let n = made.mesh.normals[t[0] as usize];
             assert!((b - a).cross(c - a).dot(n) > -slack, "turned over: {a} {b} {c}");
@@ -472,7 +474,7 @@ mod tests {
                 let mesh = mesh(face, 1e-4);
                 total += area(&mesh);
                 let key = |k: u32| mesh.points[k as usize].to_array().map(|x| (x + 0.0).to_bits());
-                for t in &mesh.triangles {
+                for t in mesh.triangles.iter() {
                     for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
                         let (a, b) = (key(a), key(b));
                         *edges.entry(if a < b { (a, b) } else { (b, a) }).or_default() +=

@@ -7,6 +7,7 @@ pub mod edge_net;
 pub mod face_mesh;
 pub mod facets;
 pub mod grid;
+pub mod soup;
 pub mod structured;
 pub mod surface_set;
 pub mod tessellate;

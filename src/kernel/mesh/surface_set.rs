@@ -117,7 +117,7 @@ impl SurfaceSet {
                         (mesh, Truth::Surface(Sheet::Trimmed(Arc::clone(f)), closed_directions(f.surface())))
                     }
                     Body::Facets(f) => {
-                        let (points, triangles) = (f.mesh().points().to_vec(), f.mesh().triangles().to_vec());
+                        let (points, triangles) = f.mesh().shared();
                         (SurfaceMesh { points, triangles, ..SurfaceMesh::default() }, Truth::Triangles)
                     }
                 })
@@ -152,7 +152,7 @@ impl SurfaceSet {
             }
             set.first.push(first);
             set.triangles.extend(mesh.triangles.iter().map(|t| t.map(|k| k + base)));
-            points.extend(mesh.points);
+            points.extend(mesh.points.iter());
             set.uv.extend(mesh.uv);
             set.uv.resize(points.len(), DVec2::ZERO);
             set.truths.push(truth);
@@ -351,7 +351,7 @@ fn border_vertices(sheet: &Sheet, mesh: &SurfaceMesh) -> Vec<bool> {
         return mesh.uv.iter().map(|uv| u.contains(&uv.x) || v.contains(&uv.y)).collect();
     }
     let mut edges: Vec<[u32; 2]> = Vec::with_capacity(3 * mesh.triangles.len());
-    for t in &mesh.triangles {
+    for t in mesh.triangles.iter() {
         edges.extend([[t[0], t[1]], [t[1], t[2]], [t[2], t[0]]].map(|[a, b]| [a.min(b), a.max(b)]));
     }
     edges.sort_unstable();

@@ -18,6 +18,8 @@
 //! Cost: linear in the number of vertices. It cannot fail; where the cap on cells cut the grid short,
 //! [`SurfaceMesh::capped`] says so.
 
+use std::sync::Arc;
+
 use glam::{DVec2, DVec3};
 
 use crate::kernel::geom::{Basis, BezierPatch, Curve, Knots, Surface};
@@ -43,15 +45,15 @@ impl TessellateOptions {
 /// The triangles of one surface. Vertex (i, j) of the grid has index `j * lines[0].len() + i`.
 #[derive(Clone, Debug, Default)]
 pub struct SurfaceMesh {
-    /// The vertices.
-    pub points: Vec<DVec3>,
+    /// The vertices; those of a mesh are its own.
+    pub points: Arc<Vec<DVec3>>,
     /// Their surface parameters.
     pub uv: Vec<DVec2>,
     /// Their unit normals (Su x Sv); a vertex where it vanishes takes the nearest defined one of its column or
     /// row. Zero only where the whole surface has none.
     pub normals: Vec<DVec3>,
     /// Vertex indices, counter-clockwise in uv. Triangles that collapse to an edge or a point are left out.
-    pub triangles: Vec<[u32; 3]>,
+    pub triangles: Arc<Vec<[u32; 3]>>,
     /// The parameters of the grid lines along u and v.
     pub lines: [Vec<f64>; 2],
     /// Whether `max_parts` made the grid coarser than the tolerance asks for.
@@ -70,11 +72,12 @@ pub fn tessellate_on(surface: &Surface, lines: [Vec<f64>; 2], capped: bool) -> S
     let (bu, bv) = (basis(0), basis(1));
     let (nu, nv) = (bu.len(), bv.len());
     let mut mesh = SurfaceMesh { capped, ..SurfaceMesh::default() };
+    let mut points = Vec::with_capacity(nu * nv);
     let mut bare = false;
     for (j, bv) in bv.iter().enumerate() {
         for (i, bu) in bu.iter().enumerate() {
             let jet = surface.jet_from(bu, bv, 1);
-            mesh.points.push(jet.p());
+            points.push(jet.p());
             mesh.uv.push(DVec2::new(lines[0][i], lines[1][j]));
             let normal = jet.normal();
             bare |= normal.is_none();
@@ -82,11 +85,12 @@ pub fn tessellate_on(surface: &Surface, lines: [Vec<f64>; 2], capped: bool) -> S
         }
     }
     mesh.lines = lines;
-    close_seams_and_poles(&mut mesh, nu, nv);
+    close_seams_and_poles(&mut points, nu, nv);
     if bare {
         fill_normals(&mut mesh.normals, nu, nv);
     }
-    mesh.triangles = triangles(&mesh.points, nu, nv);
+    mesh.triangles = Arc::new(triangles(&points, nu, nv));
+    mesh.points = Arc::new(points);
     mesh
 }
 
@@ -226,8 +230,7 @@ fn sampled_bounds(patch: &BezierPatch) -> [f64; 3] {
 
 /// Rows and columns that collapse to a point, and opposite borders that coincide, get the same coordinates to
 /// the last bit, so that rays and closest points meet no slit there.
-fn close_seams_and_poles(mesh: &mut SurfaceMesh, nu: usize, nv: usize) {
-    let points = &mut mesh.points;
+fn close_seams_and_poles(points: &mut [DVec3], nu: usize, nv: usize) {
     let size = crate::kernel::geom::Aabb::of(points.iter().copied());
     let eps = 1e-12 * (size.diagonal() + size.max_abs());
     let border = |side: usize, k: usize| match side {
@@ -329,7 +332,7 @@ mod tests {
         let tol = 1e-3;
         let mesh = tessellate(&sphere(), &TessellateOptions::new(tol));
         assert!(!mesh.capped);
-        for t in &mesh.triangles {
+        for t in mesh.triangles.iter() {
             let [a, b, c] = t.map(|k| mesh.points[k as usize]);
             // Points of a triangle lie inside the ball; the deepest is nearest to the centre.
             for p in [(a + b + c) / 3.0, 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)] {
@@ -350,7 +353,7 @@ mod tests {
         let mesh = tessellate(&sphere(), &TessellateOptions::new(1e-2));
         let key = |k: u32| mesh.points[k as usize].to_array().map(|x| (x + 0.0).to_bits());
         let mut edges: HashMap<_, i32> = HashMap::new();
-        for t in &mesh.triangles {
+        for t in mesh.triangles.iter() {
             for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
                 let (a, b) = (key(a), key(b));
                 *edges.entry(if a < b { (a, b) } else { (b, a) }).or_default() += if a < b { 1 } else { -1 };
@@ -366,7 +369,7 @@ mod tests {
         assert_eq!(flat.triangles.len(), 2);
         let tol = 1e-4;
         let twisted = tessellate(&Surface::bilinear(corners(1.0)).unwrap(), &TessellateOptions::new(tol));
-        for t in &twisted.triangles {
+        for t in twisted.triangles.iter() {
             let [a, b, c] = t.map(|k| twisted.points[k as usize]);
             for p in [(a + b + c) / 3.0, 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)] {
                 assert!((p.z - p.x * p.y).abs() <= tol);

@@ -2,6 +2,7 @@
 //! edges.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -20,8 +21,8 @@ pub struct Group {
 /// A triangle mesh. Every index is below `points.len()` and every coordinate is finite.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriMesh {
-    points: Vec<DVec3>,
-    triangles: Vec<[u32; 3]>,
+    points: Arc<Vec<DVec3>>,
+    triangles: Arc<Vec<[u32; 3]>>,
     /// Named runs of triangles, in order, not overlapping.
     pub groups: Vec<Group>,
 }
@@ -94,7 +95,7 @@ impl TriMesh {
                 return Err(MeshError::Index { triangle, index, count });
             }
         }
-        Ok(Self { points, triangles, groups: Vec::new() })
+        Ok(Self { points: Arc::new(points), triangles: Arc::new(triangles), groups: Vec::new() })
     }
 
     /// Names runs of triangles (name, first, one past the last); runs that are out of order or range are left out.
@@ -138,9 +139,15 @@ impl TriMesh {
             }
             used.into_iter().for_each(|k| renamed[k as usize] = u32::MAX);
             let groups = vec![Group { name: group.name.clone(), triangles: 0..triangles.len() }];
+            let (points, triangles) = (Arc::new(points), Arc::new(triangles));
             parts.push((group.name.clone(), Self { points, triangles, groups }));
         }
         parts
+    }
+
+    /// The vertices and the triangles, to be shared.
+    pub fn shared(&self) -> (Arc<Vec<DVec3>>, Arc<Vec<[u32; 3]>>) {
+        (Arc::clone(&self.points), Arc::clone(&self.triangles))
     }
 
     /// The vertices.
@@ -181,7 +188,7 @@ impl TriMesh {
 
     /// Turns every triangle over.
     pub fn reverse(&mut self) {
-        self.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        Arc::make_mut(&mut self.triangles).iter_mut().for_each(|t| t.swap(1, 2));
     }
 
     /// All uses of edges by triangles, sorted by edge.

@@ -2,13 +2,9 @@
 //!
 //! Equal means equal coordinates, bit for bit but for the sign of zero; a tolerance would move geometry. One
 //! open-addressing table of `u32`, linear in the number of corners; the vertices come in the order in which they first
-//! occur. Corners come one by one, or in batches whose memory accesses overlap: first all table entries of a batch are
-//! fetched, then the points that they name are compared.
+//! occur. Corners come one by one; [`super::soup`] takes all of a large file at once.
 
 use glam::DVec3;
-
-/// Corners whose table entries are fetched together.
-const BATCH: usize = 64;
 
 /// Collects corners and numbers them.
 #[derive(Clone, Debug)]
@@ -46,25 +42,6 @@ impl Welder {
         }
     }
 
-    /// Appends the numbers of many corners to `out`, as [`Self::vertex`] would give them one by one. `None` when `u32`
-    /// cannot number any more.
-    pub fn vertices(&mut self, corners: &[DVec3], out: &mut Vec<u32>) -> Option<()> {
-        let mut guess = [0_u32; BATCH];
-        for batch in corners.chunks(BATCH) {
-            let mask = self.table.len() - 1;
-            for (guess, &p) in guess.iter_mut().zip(batch) {
-                *guess = self.table[hash(p + DVec3::ZERO) as usize & mask];
-            }
-            for (&guess, &p) in guess.iter().zip(batch) {
-                match guess.checked_sub(1) {
-                    Some(k) if self.points[k as usize] == p => out.push(k),
-                    _ => out.push(self.vertex(p)?),
-                }
-            }
-        }
-        Some(())
-    }
-
     fn grow(&mut self) {
         let length = 2 * self.table.len();
         self.table = vec![0; length];
@@ -94,20 +71,6 @@ fn hash(p: DVec3) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn batches_are_the_same_as_one_by_one() {
-        let at = |k: usize| DVec3::new((k * 7919 % 301) as f64, (k % 17) as f64 - 8.0, -0.0);
-        let corners: Vec<DVec3> = (0..20_077).map(at).collect();
-        let (mut batches, mut one_by_one) = (Welder::with_capacity(16), Welder::with_capacity(16));
-        let mut numbers = Vec::new();
-        for part in corners.chunks(1000) {
-            batches.vertices(part, &mut numbers).unwrap();
-        }
-        let slow: Vec<u32> = corners.iter().map(|&p| one_by_one.vertex(p).unwrap()).collect();
-        assert_eq!(numbers, slow);
-        assert_eq!(batches.into_points(), one_by_one.into_points());
-    }
 
     #[test]
     fn equal_corners_share_a_vertex_and_order_is_first_come() {

@@ -14,8 +14,8 @@ use crate::kernel::mesh::tri_tree::TriTree;
 /// "Triangulation"); the parameters follow the vertices, which are kept once per knot line.
 #[derive(Clone, Debug)]
 pub struct Sheet {
-    points: Vec<DVec3>,
-    triangles: Vec<[u32; 3]>,
+    points: Arc<Vec<DVec3>>,
+    triangles: Arc<Vec<[u32; 3]>>,
     uv: Vec<DVec2>,
     tree: TriTree,
     surface: Option<Arc<Surface>>,
@@ -33,13 +33,13 @@ impl Sheet {
                 (mesh.points, mesh.triangles, mesh.uv, Some(Arc::clone(surface)), mesh.capped)
             }
             (Body::Facets(facets), None) => {
-                let mesh = facets.mesh();
-                (mesh.points().to_vec(), mesh.triangles().to_vec(), Vec::new(), None, false)
+                let (points, triangles) = facets.mesh().shared();
+                (points, triangles, Vec::new(), None, false)
             }
             // Not reached: what has no surface is a mesh.
             (_, None) => Default::default(),
         };
-        let tree = TriTree::new(points.clone(), &triangles);
+        let tree = TriTree::new(points.to_vec(), &triangles);
         Self { points, triangles, uv, tree, surface, capped }
     }
 

@@ -58,7 +58,7 @@ impl<'s> Part<'s> {
             None => tessellate(surface, &options),
             Some(face) => tessellate_face(face, &options, &[Vec::new(), Vec::new()]).mesh,
         };
-        let tree = TriTree::new(mesh.points.clone(), &mesh.triangles);
+        let tree = TriTree::new(mesh.points.to_vec(), &mesh.triangles);
         let borders = strips::borders(sheet);
         let off = borders.iter().map(|border| border.off(surface)).fold(0.0, f64::max);
         // Segments are triangles with two equal corners.

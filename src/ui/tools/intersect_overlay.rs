@@ -135,7 +135,7 @@ impl IntersectSession {
             } else {
                 field.mesh.normals.iter().map(|n| n.as_vec3().to_array()).collect()
             };
-            d.mesh(&points, normals, field.mesh.triangles.clone(), srgb(0xffffff), Some(colors));
+            d.mesh(&points, normals, field.mesh.triangles.to_vec(), srgb(0xffffff), Some(colors));
         }
         !meshes.is_empty()
     }

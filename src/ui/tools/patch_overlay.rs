@@ -232,7 +232,7 @@ impl PatchSession {
             scale: Arc::new(self.scale()),
         });
         let normals = normals.iter().map(|n| n.as_vec3().to_array()).collect();
-        d.mesh(points, normals, triangles.clone(), linear(t.good), field);
+        d.mesh(points, normals, triangles.to_vec(), linear(t.good), field);
         let mut marks = GlyphData::new(d.origin);
         for (point, status) in &shown.samples {
             if *status == Status::Artificial {

@@ -9,7 +9,7 @@ use glam::{DVec2, DVec3};
 
 use crate::kernel::geom::Aabb;
 use crate::model::document::{Document, EntityId};
-use crate::render::{self, FrameData, Stage};
+use crate::render::{self, FrameData, Prepared, Stage};
 use crate::view::camera::{Axis, Camera, Projection};
 use crate::view::navigation::Drag;
 use crate::view::pick::{Cycle, PickHit};
@@ -51,7 +51,9 @@ pub struct Viewport {
     pub rect: Rect,
     has_gpu: bool,
     stage: Stage,
-    making: Option<Ticket<Vec<Made>>>,
+    making: Option<Ticket<Vec<(Made, Prepared)>>>,
+    /// What was taken over last has not been drawn yet.
+    fresh: bool,
     scene_stamp: u64,
     bounds: (u64, Aabb),
     seen_revision: Option<u64>,
@@ -87,6 +89,7 @@ impl Viewport {
             has_gpu: gpu.is_some(),
             stage: Stage::default(),
             making: None,
+            fresh: false,
             scene_stamp: 0,
             bounds: (0, Aabb::EMPTY),
             seen_revision: None,
@@ -161,7 +164,7 @@ impl Viewport {
 
     /// Whether the picture still moves or is still being refined.
     pub fn is_moving(&self) -> bool {
-        self.motion.is_some() || self.frame_next.is_some() || self.making.is_some()
+        self.motion.is_some() || self.frame_next.is_some() || self.making.is_some() || self.fresh
     }
 
     /// Changes between perspective and parallel projection.
@@ -238,37 +241,46 @@ impl Viewport {
                 self.motion = None;
             }
         }
-        self.refine(jobs);
+        let again = self.refine(jobs);
         if self.bounds.0 != self.scene_stamp {
             // Looks at every vertex, so only when something has changed.
             self.bounds = (self.scene_stamp, self.scene.bounds());
         }
-        self.motion.is_some()
+        again || self.motion.is_some()
     }
 
-    /// Has displays made that the view is in want of, and takes over those that are ready.
-    fn refine(&mut self, jobs: &mut Jobs) {
+    /// Has displays made that the view is in want of, and takes over those that are ready. Returns whether it is to be
+    /// called again at the next frame.
+    fn refine(&mut self, jobs: &mut Jobs) -> bool {
         if let Some(outcome) = self.making.as_ref().and_then(Ticket::poll) {
             self.making = None;
             match outcome {
                 Outcome::Finished { value, .. } => {
-                    for made in value {
+                    let before = self.scene_stamp;
+                    for (made, prepared) in value {
                         if self.scene.accept(made) {
+                            self.stage.accept(prepared);
                             self.scene_stamp += 1;
                         }
+                    }
+                    if self.scene_stamp != before {
+                        // What is there is shown before more is asked for.
+                        self.fresh = true;
+                        return true;
                     }
                 }
                 Outcome::NeverRan => {}
                 Outcome::Panicked { message, .. } => log::error!("a display could not be made: {message}"),
             }
         }
+        self.fresh = false;
         // While the camera moves, what is there is good enough.
         if self.making.is_some() || self.motion.is_some() {
-            return;
+            return false;
         }
         let mut wanted = self.scene.wanted(&self.view());
         if wanted.is_empty() {
-            return;
+            return false;
         }
         wanted.truncate(BATCH);
         let name = match wanted.len() {
@@ -277,8 +289,14 @@ impl Viewport {
         };
         self.making = Some(jobs.spawn(Lane::Preview, name, "", move |_| {
             use rayon::prelude::*;
-            wanted.into_par_iter().map(Request::run).collect()
+            let make = |request: Request| {
+                let made = request.run();
+                let prepared = Prepared::new(&made);
+                (made, prepared)
+            };
+            wanted.into_par_iter().map(make).collect()
         }));
+        false
     }
 
     /// A point of the window as a pixel of the picture.
