@@ -12,144 +12,25 @@
 //! Cost: a closest point a sample and neighbour, some microseconds each; meant for a worker. A kind that shows at
 //! one sample only, between two that agree, is taken as chance (a surface that crosses there) and passed over.
 
+mod borders;
+mod creases;
+mod kinds;
 mod rims;
+
+pub use kinds::{EdgeKind, EdgeOptions, EdgePiece, Edges, LinePattern};
 
 use std::sync::Arc;
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
-use super::colormap::Rgb;
-use super::display::{CurveRef, Geometry};
-use crate::kernel::geom::trim::{EdgeRole, Sheet};
-use crate::kernel::geom::{Aabb, Direction, Side};
+use super::display::CurveRef;
+use crate::kernel::geom::Aabb;
+use crate::kernel::geom::trim::Sheet;
 use crate::kernel::job::Job;
 use crate::kernel::mesh::body::Body;
 use crate::kernel::mesh::surface_set::{OnSurface, Scratch, SurfaceSet};
 use crate::model::document::{Document, EntityId, Shape};
-
-/// What an edge is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum EdgeKind {
-    /// No other surface is near.
-    Free,
-    /// One other surface is near, but not exactly there.
-    Gap,
-    /// One other surface meets it exactly.
-    Shared,
-    /// The same, and the normal turns.
-    Feature,
-    /// More than one other surface is near.
-    NonManifold,
-    /// A free curve of the model.
-    Curve,
-}
-
-/// How a line is drawn, so that colour is not the only sign.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LinePattern {
-    /// One full line.
-    Solid,
-    /// A thin line.
-    Thin,
-    /// Two lines side by side.
-    Double,
-    /// Short dashes.
-    ShortDash,
-}
-
-impl EdgeKind {
-    /// All kinds, in the order of the legend.
-    pub const ALL: [Self; 6] = [Self::Free, Self::Gap, Self::NonManifold, Self::Feature, Self::Shared, Self::Curve];
-
-    /// The words in the legend.
-    pub fn label(self) -> &'static str {
-        match self {
-            Self::Free => "Free edge",
-            Self::Gap => "Shared within tolerance, open gap",
-            Self::Shared => "Shared edge",
-            Self::Feature => "Feature edge",
-            Self::NonManifold => "Non-manifold edge",
-            Self::Curve => "Free curve",
-        }
-    }
-
-    /// The colour (sRGB) and pattern, with the meanings that users of meshing programs know: red free, green shared,
-    /// yellow non-manifold; orange dashes are gaps.
-    pub fn style(self) -> (Rgb, LinePattern) {
-        match self {
-            Self::Free => ([0.90, 0.16, 0.16], LinePattern::Solid),
-            Self::Gap => ([0.95, 0.55, 0.10], LinePattern::ShortDash),
-            Self::Shared => ([0.20, 0.65, 0.30], LinePattern::Thin),
-            Self::Feature => ([0.10, 0.60, 0.62], LinePattern::Solid),
-            Self::NonManifold => ([0.90, 0.80, 0.10], LinePattern::Double),
-            Self::Curve => ([0.55, 0.35, 0.85], LinePattern::Solid),
-        }
-    }
-
-    /// Whether it offers itself as a side of a patch.
-    pub fn is_candidate(self) -> bool {
-        !matches!(self, Self::Shared)
-    }
-}
-
-/// A stretch of a curve of one kind.
-#[derive(Clone, Debug, PartialEq)]
-pub struct EdgePiece {
-    /// Which curve.
-    pub curve: CurveRef,
-    /// The stretch in the curve's parameter.
-    pub range: [f64; 2],
-    /// What it is.
-    pub kind: EdgeKind,
-    /// The surfaces that are near, in the order of the document.
-    pub neighbours: Vec<EntityId>,
-    /// How far the neighbours are away at most, at the samples.
-    pub max_gap: f64,
-    /// By how much the normal turns at most, in degrees, at the samples.
-    pub max_angle: f64,
-}
-
-/// How to look for edges.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EdgeOptions {
-    /// How near a surface must be to count as a neighbour, in model units.
-    pub joining_tol: f64,
-    /// A gap up to this is none, in model units. Default: a thousandth of the joining tolerance.
-    pub closed_tol: f64,
-    /// The normal must turn by more than this for a feature edge, in degrees. Default 20.
-    pub feature_angle: f64,
-    /// Samples for every knot span. Default 8, at least 24 and at most 512 a border.
-    pub per_span: usize,
-}
-
-impl EdgeOptions {
-    /// The defaults for a joining tolerance.
-    pub fn new(joining_tol: f64) -> Self {
-        Self { joining_tol, closed_tol: 1e-3 * joining_tol, feature_angle: 20.0, per_span: 8 }
-    }
-}
-
-/// All edges of a model.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Edges {
-    /// The stretches, surface by surface in the order of the document, then the free curves.
-    pub pieces: Vec<EdgePiece>,
-    /// False when the job was cancelled before all were looked at.
-    pub complete: bool,
-}
-
-impl Edges {
-    /// How many stretches there are of a kind.
-    pub fn count(&self, kind: EdgeKind) -> usize {
-        self.pieces.iter().filter(|p| p.kind == kind).count()
-    }
-
-    /// The stretch of a curve that holds a parameter.
-    pub fn at(&self, curve: &CurveRef, t: f64) -> Option<&EdgePiece> {
-        self.pieces.iter().find(|p| p.curve == *curve && p.range[0] <= t && t <= p.range[1])
-    }
-}
 
 /// Something that borders can be near to.
 struct Part {
@@ -235,12 +116,12 @@ pub fn feature_edges(document: &Document, options: &EdgeOptions, job: &Job) -> E
         .map(|k| {
             let mut out = Vec::new();
             if let Some(sheet) = sheet_of(&parts[k].body) {
-                for curve in borders_of(&parts[k], &sheet) {
+                for curve in borders::borders_of(&parts[k], &sheet) {
                     if !job.is_cancelled() {
-                        border(&parts, k, &sheet, curve, options, &mut out);
+                        borders::border(&parts, k, &sheet, curve, options, &mut out);
                     }
                 }
-                creases(parts[k].id, &sheet, options, &mut out);
+                creases::creases(parts[k].id, &sheet, options, &mut out);
             }
             let done = 1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
             job.progress(done as f64 / parts.len() as f64);
@@ -281,192 +162,11 @@ fn sheet_of(body: &Body) -> Option<Sheet> {
     }
 }
 
-/// The borders of a whole surface; the edges of a face, a seam once.
-fn borders_of(part: &Part, sheet: &Sheet) -> Vec<CurveRef> {
-    let Some(face) = sheet.face() else { return Side::ALL.map(|side| CurveRef::Border(part.id, side)).into() };
-    let mut out = Vec::new();
-    for (r, ring) in face.rings().iter().enumerate() {
-        for (e, edge) in ring.edges.iter().enumerate() {
-            let again = ring.edges[..e].iter().any(|other| other.id == edge.id);
-            if edge.role == EdgeRole::Model && !again {
-                out.push(CurveRef::Edge(part.id, r as u32, e as u32));
-            }
-        }
-    }
-    out
-}
-
-fn border(parts: &[Part], k: usize, sheet: &Sheet, curve: CurveRef, options: &EdgeOptions, out: &mut Vec<EdgePiece>) {
-    let own = &parts[k];
-    let surface = sheet.surface();
-    let geometry = match sheet {
-        Sheet::Whole(surface) => Geometry::Surface(Arc::clone(surface)),
-        Sheet::Trimmed(face) => Geometry::Face { face: Arc::clone(face), whole: false },
-    };
-    let Some([start, end]) = geometry.curve_domain(&curve) else { return };
-    let mut breaks = vec![start];
-    breaks.extend(geometry.curve_knots(&curve));
-    breaks.push(end);
-    let places = places(&breaks, options);
-    let uv = |t: f64| geometry.curve_uv(&curve, t).unwrap_or(DVec2::ZERO);
-    let points: Vec<DVec3> = places.iter().map(|&t| surface.eval(surface.clamped(uv(t)))).collect();
-    let size = Aabb::of(points.iter().copied());
-    // A border that is shorter than what is joined is a pole.
-    if size.diagonal() <= options.joining_tol.min(1e-6 * own.bounds.diagonal()) {
-        return;
-    }
-    let others = near_to(parts, own, &size, options);
-    let mut scratch = Scratch::default();
-    let look = |t: f64| near(own, sheet, &curve, &others, uv(t), options, &mut scratch);
-    stretches(curve, [start, end], &places, look, options, out);
-}
-
-/// Where a border is looked at.
-fn places(breaks: &[f64], options: &EdgeOptions) -> Vec<f64> {
-    let spans = breaks.len() - 1;
-    let per_span = options.per_span.max(24_usize.div_ceil(spans)).min(512_usize.div_ceil(spans)).max(1);
-    let mut places = Vec::new();
-    for pair in breaks.windows(2) {
-        let step = (pair[1] - pair[0]) / per_span as f64;
-        places.extend((0..per_span).map(|i| pair[0] + step * (i as f64 + 0.5)));
-    }
-    places
-}
-
-/// The other bodies that may be near a border in this box.
-fn near_to<'p>(parts: &'p [Part], own: &Part, size: &Aabb, options: &EdgeOptions) -> Vec<&'p Part> {
-    let reach = size.grown(options.joining_tol + 0.5 * size.diagonal());
-    parts.iter().filter(|p| p.id != own.id && p.bounds.overlaps(&reach)).collect()
-}
-
-/// Cuts a curve where what is near it changes.
-fn stretches(
-    curve: CurveRef,
-    [start, end]: [f64; 2],
-    places: &[f64],
-    mut look: impl FnMut(f64) -> Near,
-    options: &EdgeOptions,
-    out: &mut Vec<EdgePiece>,
-) {
-    let mut seen: Vec<Near> = places.iter().map(|&t| look(t)).collect();
-    let same = |a: &Near, b: &Near| a.neighbours == b.neighbours && kind_of(a, options) == kind_of(b, options);
-    for i in 1..seen.len().saturating_sub(1) {
-        if !same(&seen[i], &seen[i - 1]) && same(&seen[i - 1], &seen[i + 1]) {
-            seen[i] = seen[i - 1].clone();
-        }
-    }
-    let mut from = start;
-    let mut first = 0;
-    for i in 0..seen.len() {
-        let last = i + 1 == seen.len();
-        if !last && same(&seen[i], &seen[i + 1]) {
-            continue;
-        }
-        let to = if last {
-            end
-        } else {
-            let (mut low, mut high) = (places[i], places[i + 1]);
-            for _ in 0..30 {
-                let middle = 0.5 * (low + high);
-                if same(&look(middle), &seen[i]) { low = middle } else { high = middle }
-            }
-            0.5 * (low + high)
-        };
-        let stretch = &seen[first..=i];
-        out.push(EdgePiece {
-            curve,
-            range: [from, to],
-            kind: kind_of(&seen[i], options),
-            neighbours: seen[i].neighbours.clone(),
-            max_gap: stretch.iter().map(|n| n.gap).fold(0.0, f64::max),
-            max_angle: stretch.iter().map(|n| n.angle).fold(0.0, f64::max),
-        });
-        (from, first) = (to, i + 1);
-    }
-}
-
-/// The bodies near a place of a border. `uv` is the place on the surface itself.
-fn near(
-    own: &Part,
-    sheet: &Sheet,
-    curve: &CurveRef,
-    others: &[&Part],
-    uv: DVec2,
-    options: &EdgeOptions,
-    scratch: &mut Scratch,
-) -> Near {
-    let surface = sheet.surface();
-    let jet = surface.jet(uv, 1);
-    let (p, normal) = (jet.p(), jet.normal());
-    let mut out = Near::default();
-    // The seam of a closed surface: the same parameter on the opposite border.
-    let [u, v] = surface.domain();
-    let opposite = match curve {
-        CurveRef::Border(_, Side::VMin) => Some(DVec2::new(uv.x, v[1])),
-        CurveRef::Border(_, Side::VMax) => Some(DVec2::new(uv.x, v[0])),
-        CurveRef::Border(_, Side::UMin) => Some(DVec2::new(u[1], uv.y)),
-        CurveRef::Border(_, Side::UMax) => Some(DVec2::new(u[0], uv.y)),
-        // A face runs its seam twice.
-        CurveRef::Edge(_, ring, edge) => sheet.face().and_then(|face| {
-            let ring = face.rings().get(*ring as usize)?;
-            let id = ring.edges.get(*edge as usize)?.id;
-            (ring.edges.iter().filter(|e| e.id == id).count() > 1).then_some(uv)
-        }),
-        _ => None,
-    };
-    if let Some(opposite) = opposite {
-        let across = surface.jet(opposite, 1);
-        if across.p().distance(p) <= options.joining_tol {
-            out.meet(own.id, across.p().distance(p), [normal, across.normal()]);
-        }
-    }
-    out.meet_all(p, normal, others, options.joining_tol, scratch);
-    out
-}
-
-/// Knots of full multiplicity at which the normal turns by more than the feature angle.
-fn creases(id: EntityId, sheet: &Sheet, options: &EdgeOptions, out: &mut Vec<EdgePiece>) {
-    let surface = sheet.surface();
-    // The seam that a face was moved to is such a knot without being a crease; normals tell.
-    for (k, fixed) in [Direction::U, Direction::V].into_iter().enumerate() {
-        let knots = &surface.knots()[k];
-        let [start, end] = knots.domain();
-        let along = surface.domain()[1 - k];
-        for (t, multiplicity) in knots.multiplicities() {
-            if multiplicity < knots.degree() || t <= start || t >= end {
-                continue;
-            }
-            let step = 1e-7 * (end - start);
-            let place = |t: f64, s: f64| {
-                let s = along[0] + (along[1] - along[0]) * s;
-                if k == 0 { DVec2::new(t, s) } else { DVec2::new(s, t) }
-            };
-            let normal = |t: f64, s: f64| surface.jet(place(t, s), 1).normal();
-            let turns = (0..17).filter_map(|i| {
-                let s = (f64::from(i) + 0.5) / 17.0;
-                let (a, b) = (normal(t - step, s)?, normal(t + step, s)?);
-                Some(a.dot(b).clamp(-1.0, 1.0).acos().to_degrees())
-            });
-            let turn = turns.fold(0.0, f64::max);
-            if turn > options.feature_angle {
-                let stretches = sheet.face().map_or_else(|| vec![along], |face| face.stretches(k, t));
-                out.extend(stretches.into_iter().map(|range| EdgePiece {
-                    curve: CurveRef::Iso(id, fixed, t),
-                    range,
-                    kind: EdgeKind::Feature,
-                    neighbours: vec![id],
-                    max_gap: 0.0,
-                    max_angle: turn,
-                }));
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::display::Geometry;
     use super::*;
-    use crate::kernel::geom::{Curve, Knots, Surface};
+    use crate::kernel::geom::{Curve, Direction, Knots, Side, Surface};
     use crate::model::document::Unit;
     use crate::view::display::tests::sphere;
 

@@ -7,6 +7,7 @@ pub mod deviation;
 pub mod display;
 mod facet_shading;
 pub mod feature_edges;
+mod geometry;
 pub mod histogram;
 pub mod inspect;
 pub mod intersection;

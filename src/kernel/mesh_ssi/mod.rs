@@ -1,7 +1,10 @@
 //! Intersection of triangulations (HJR99 section 4, ALGORITHMS section 5): trees, triangle pairs with exact
 //! signs, Point / PointUse / Segment topology, chains.
 
+mod adapted;
 pub mod border;
+mod chain_curve;
+mod chain_point;
 pub mod engine;
 pub mod join;
 pub mod near;

@@ -16,7 +16,8 @@ use std::collections::HashMap;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{EdgeKind, EdgeOptions, EdgePiece, Near, Part, near_to, places, stretches};
+use super::borders::{near_to, places, stretches};
+use super::{EdgeKind, EdgeOptions, EdgePiece, Near, Part};
 use crate::kernel::geom::Aabb;
 use crate::kernel::job::Job;
 use crate::kernel::mesh::body::Body;
