@@ -441,6 +441,7 @@ impl Tracer<'_> {
 
     /// The points of a step as far as it stays in the pair of pieces, the last on the border where it leaves it, and then
     /// a point of it beyond. The error is that point, where the border cannot be met.
+    #[allow(clippy::result_large_err, reason = "both outcomes are nodes by value, of about the same size")]
     fn inside(&self, mode: Mode, step: [&TraceNode; 3]) -> Result<(Vec<TraceNode>, Option<TraceNode>), TraceNode> {
         let mut ends = Vec::with_capacity(2);
         for pair in step.windows(2) {
