@@ -79,6 +79,20 @@ impl Chord<'_> {
         let [p, q] = self.ends();
         CurvePoint { xyz: p.xyz.lerp(q.xyz, s), uv: p.uv.lerp(q.uv, s), st: p.st.lerp(q.st, s), ..*p }
     }
+
+    /// The parameters on one of its two bodies.
+    fn on(&self, body: usize, s: f64) -> DVec2 {
+        let at = self.between(s);
+        if at.a == body { at.uv } else { at.st }
+    }
+
+    /// The place on it that is nearest to a point, and how far that is.
+    fn nearest(&self, x: DVec3) -> (f64, f64) {
+        let ([p, q], d) = (self.ends(), self.along());
+        let s = ((x - p.xyz).dot(d) / d.length_squared()).clamp(0.0, 1.0);
+        let s = if s.is_finite() { s } else { 0.0 };
+        (s, p.xyz.lerp(q.xyz, s).distance(x))
+    }
 }
 
 /// A point of three with the two curves on which it was seen: their numbers and the places on them.
@@ -263,7 +277,8 @@ fn chords<'a>(curves: &'a [IntersectionCurve], bodies: &impl Bodies, size: Size)
                 let before = if at > 0 { direction(at - 1) } else { None };
                 turns(before).max(turns(direction(at + 1)))
             };
-            let off = 0.3 * length * turn + curve.error_bound + size.same;
+            // Between points this near the curve cannot be further off than they are apart.
+            let off = (0.3 * length * turn + curve.error_bound).min(length) + size.same;
             out.push(Chord { curve, number, at, off, turn });
         }
     }
@@ -285,15 +300,23 @@ fn search(curves: &[IntersectionCurve], bodies: &impl Bodies, size: Size, job: &
         let (p, q) = (&chords[k as usize], &chords[m as usize]);
         k < m && third_body(p.ends()[0], q.ends()[0]).is_some()
     });
-    pairs.sort_unstable();
+    // A chord with all those of its curves' neighbours that have the same third body.
+    let mut meetings: Vec<(u32, usize, u32)> = Vec::new();
+    for [k, m] in pairs {
+        let third = third_body(chords[k as usize].ends()[0], chords[m as usize].ends()[0]);
+        meetings.extend(third.map(|third| (k, third, m)));
+    }
+    meetings.sort_unstable();
     let seeker = Seeker { bodies, size };
-    let found: Vec<Vec<Found>> = pairs
-        .par_iter()
-        .map(
-            |&[k, m]| {
-                if job.is_cancelled() { Vec::new() } else { seeker.points(chords[k as usize], chords[m as usize]) }
-            },
-        )
+    let found: Vec<Vec<Found>> = meetings
+        .par_chunk_by(|x, y| (x.0, x.1) == (y.0, y.1))
+        .map(|group| {
+            if job.is_cancelled() {
+                return Vec::new();
+            }
+            let others: Vec<Chord<'_>> = group.iter().map(|&(_, _, m)| chords[m as usize]).collect();
+            seeker.points(chords[group[0].0 as usize], group[0].1, &others)
+        })
         .collect();
     (!job.is_cancelled()).then(|| found.into_iter().flatten().collect())
 }
@@ -325,29 +348,40 @@ struct Seeker<'a, B> {
 }
 
 impl<B: Bodies> Seeker<'_, B> {
-    /// The points of three on a pair of chords.
-    fn points(&self, p: Chord<'_>, q: Chord<'_>) -> Vec<Found> {
-        let Some(third) = third_body(p.ends()[0], q.ends()[0]) else { return Vec::new() };
-        let (s, t, distance, sine) = nearest(p.ends().map(|p| p.xyz), q.ends().map(|p| p.xyz));
-        if !(distance <= p.off + q.off) {
-            return Vec::new();
-        }
-        let (on_p, on_q) = (p.between(s), q.between(t));
-        let start = if on_q.a == third { on_q.uv } else { on_q.st };
-        let met = if sine > ALONGSIDE.max(p.turn + q.turn) {
-            let on = [On::Body(on_p.a, on_p.uv), On::Body(on_p.b, on_p.st), On::Body(third, start)];
+    /// The points on a chord's curve and a third body, on which the curves of the other chords lie.
+    fn points(&self, p: Chord<'_>, third: usize, others: &[Chord<'_>]) -> Vec<Found> {
+        let mut met: Vec<Met> = Vec::new();
+        let mut alongside: Vec<Chord<'_>> = Vec::new();
+        for q in others {
+            let (s, t, distance, sine) = nearest(p.ends().map(|p| p.xyz), q.ends().map(|p| p.xyz));
+            if !(distance <= p.off + q.off) {
+                continue;
+            }
+            if sine <= ALONGSIDE.max(p.turn + q.turn) {
+                alongside.push(*q);
+                continue;
+            }
+            let on_p = p.between(s);
+            let on = [On::Body(on_p.a, on_p.uv), On::Body(on_p.b, on_p.st), On::Body(third, q.on(third, t))];
             let reach = p.along().length() + q.along().length() + p.off + q.off;
-            meet(self.bodies, on, on_p.xyz, self.near(reach)).into_iter().collect()
-        } else {
-            self.alongside(p, third, start)
-        };
+            met.extend(meet(self.bodies, on, on_p.xyz, self.near(reach)));
+        }
+        if !alongside.is_empty() {
+            met.extend(self.alongside(p, third, &alongside));
+        }
+        let [on_p, _] = p.ends();
+        // What lies beside other chords is found from those.
+        met.retain(|met| p.nearest(met.xyz).1 <= 2.0 * p.off);
         let found = met.into_iter().filter_map(|met| {
-            let passes = [self.place(p, met.xyz)?, self.place(q, met.xyz)?];
+            let mut nearby: Vec<(f64, &Chord<'_>)> = others.iter().map(|q| (q.nearest(met.xyz).1, q)).collect();
+            nearby.sort_by(|x, y| x.0.total_cmp(&y.0));
+            let own = self.place(p, met.xyz)?;
+            let other = nearby.iter().take(3).find_map(|(_, q)| self.place(**q, met.xyz))?;
             let bodies = [on_p.a, on_p.b, third];
             let mut order = [0, 1, 2];
             order.sort_by_key(|&k| bodies[k]);
             let uv = order.map(|k| self.bodies.place(bodies[k], met.uv[k], met.xyz));
-            Some(Found { bodies: order.map(|k| bodies[k]), met: Met { uv, ..met }, passes })
+            Some(Found { bodies: order.map(|k| bodies[k]), met: Met { uv, ..met }, passes: [own, other] })
         });
         found.collect()
     }
@@ -369,13 +403,7 @@ impl<B: Bodies> Seeker<'_, B> {
     /// Where a curve passes through a point near one of its chords.
     fn place(&self, chord: Chord<'_>, x: DVec3) -> Option<(usize, f64)> {
         let (curve, last) = (chord.curve, chord.curve.points.len() - 2);
-        let distance = |k: usize| {
-            let [p, q] = [curve.points[k].xyz, curve.points[k + 1].xyz];
-            let d = q - p;
-            let f = ((x - p).dot(d) / d.length_squared()).clamp(0.0, 1.0);
-            let f = if f.is_finite() { f } else { 0.0 };
-            ((p + d * f).distance(x), f)
-        };
+        let distance = |at: usize| Chord { at, ..chord }.nearest(x);
         let joins = |k: usize| {
             let (p, q) = (&curve.points[k], &curve.points[k + 1]);
             p.a == q.a && p.b == q.b
@@ -386,8 +414,8 @@ impl<B: Bodies> Seeker<'_, B> {
             let before = if at > 0 { Some(at - 1) } else { curve.closed.then_some(last) };
             let after = if at < last { Some(at + 1) } else { curve.closed.then_some(0) };
             let sides = [before, after].into_iter().flatten().filter(|&k| joins(k)).map(|k| (k, distance(k)));
-            let Some((next, nearer)) = sides.min_by(|x, y| x.1.0.total_cmp(&y.1.0)) else { break };
-            if nearer.0 >= best.0 {
+            let Some((next, nearer)) = sides.min_by(|x, y| x.1.1.total_cmp(&y.1.1)) else { break };
+            if nearer.1 >= best.1 {
                 break;
             }
             (at, best) = (next, nearer);
@@ -397,7 +425,7 @@ impl<B: Bodies> Seeker<'_, B> {
         let crosses = curve.kind != CurveKind::Tangential;
         let off = match self.on_curve(own, x).filter(|_| crosses) {
             Some(met) => met.xyz.distance(x),
-            None if best.0 <= 2.0 * chord.off => 0.0,
+            None if best.1 <= 2.0 * chord.off => 0.0,
             None => f64::INFINITY,
         };
         if off > self.size.same {
@@ -419,19 +447,21 @@ impl<B: Bodies> Seeker<'_, B> {
         let place = match () {
             () if near(at) => settled(at),
             () if near(at + 1) => settled(at + 1),
-            () => at as f64 + best.1,
+            () => at as f64 + best.0,
         };
         // The last point of a ring is its first.
         let ring = curve.closed && place as usize == last + 1 && joins(last);
         Some((chord.number, if ring { 0.0 } else { place }))
     }
 
-    /// The points of a chord's curve on a body along which it runs.
-    fn alongside(&self, chord: Chord<'_>, third: usize, start: DVec2) -> Vec<Met> {
+    /// The points of a chord's curve on a body along which it runs, beside the curves of other chords.
+    fn alongside(&self, chord: Chord<'_>, third: usize, others: &[Chord<'_>]) -> Vec<Met> {
         let at = |s: f64| -> Option<(f64, Met)> {
             let lerp = chord.between(s);
             let own = if chord.curve.kind == CurveKind::Tangential { None } else { self.on_curve(chord, lerp.xyz) };
             let met = own.unwrap_or(Met { xyz: lerp.xyz, uv: [lerp.uv, lerp.st, DVec2::ZERO], gap: 0.0 });
+            let near = others.iter().map(|q| (q.nearest(met.xyz), q)).min_by(|x, y| x.0.1.total_cmp(&y.0.1));
+            let start = near.map(|((t, _), q)| q.on(third, t))?;
             let (h, w) = height(self.bodies, third, start, met.xyz, self.size.rounding)?;
             Some((h, Met { uv: [met.uv[0], met.uv[1], w], ..met }))
         };
