@@ -9,6 +9,7 @@
 mod bernstein;
 pub mod biarc;
 pub(crate) mod binormal;
+mod boxes;
 pub mod clip;
 mod contact;
 mod correct;
