@@ -67,6 +67,33 @@ impl Boxes {
     }
 }
 
+/// Balls that nearly touch, by groups in which each is reached from each; the groups and their members in ascending order
+/// of the first, the members in the order in which they are reached.
+pub fn clusters(balls: &[(DVec3, f64)]) -> Vec<Vec<usize>> {
+    let boxes: Vec<Aabb> = balls.iter().map(|&(p, r)| Aabb { min: p - 1.2 * r, max: p + 1.2 * r }).collect();
+    let tree = Boxes::new(&boxes);
+    let mut reached = vec![false; balls.len()];
+    let mut out = Vec::new();
+    for start in 0..balls.len() {
+        if reached[start] {
+            continue;
+        }
+        reached[start] = true;
+        let (mut members, mut next) = (vec![start], 0);
+        while let Some(&at) = members.get(next) {
+            let (p, r) = balls[at];
+            let near = |&k: &usize| !reached[k] && p.distance(balls[k].0) < 1.2 * (r + balls[k].1) + 1e-9;
+            let mut more: Vec<usize> = tree.around(p, 1.2 * r + 2e-9).filter(near).collect();
+            more.sort_unstable();
+            more.iter().for_each(|&k| reached[k] = true);
+            members.extend(more);
+            next += 1;
+        }
+        out.push(members);
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -94,5 +121,19 @@ mod tests {
             assert_eq!(found, slow);
         }
         assert_eq!(Boxes::new(&[]).around(DVec3::ZERO, 1.0).count(), 0);
+    }
+
+    #[test]
+    fn chains_of_balls_are_clusters() {
+        // Three rows of balls, each row 1 apart from the next and its balls 0.2 apart from one another.
+        let balls: Vec<(DVec3, f64)> =
+            (0..60).map(|k| (DVec3::new(0.2 * f64::from(k / 3), f64::from(k % 3), 0.0), 0.1)).collect();
+        let found = clusters(&balls);
+        assert_eq!(found.len(), 3);
+        for (row, members) in found.iter().enumerate() {
+            assert_eq!(*members, (0..20).map(|k| 3 * k + row).collect::<Vec<_>>());
+        }
+        let far: Vec<(DVec3, f64)> = balls.iter().map(|&(p, r)| (p, 0.5 * r)).collect();
+        assert_eq!(clusters(&far).len(), 60);
     }
 }

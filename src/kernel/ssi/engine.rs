@@ -17,6 +17,7 @@ use std::time::Instant;
 use glam::{DVec2, DVec3};
 
 use super::binormal;
+use super::boxes;
 use super::contact::{Cell, Findings, SLACK, Seed};
 use super::correct::{Condition, PointPair};
 use super::junction::{Contacted, arms_of, is_point};
@@ -371,29 +372,8 @@ impl Engine {
         };
         let places: Vec<(DVec3, f64)> = cells.iter().map(|c| place(c)).collect();
         // Cells that touch belong together. Large cells are regions, never points.
-        let mut cluster = vec![usize::MAX; cells.len()];
-        let mut clusters: Vec<Vec<usize>> = Vec::new();
-        for start in 0..cells.len() {
-            if cluster[start] != usize::MAX {
-                continue;
-            }
-            cluster[start] = clusters.len();
-            let (mut members, mut next) = (vec![start], 0);
-            while next < members.len() {
-                let (p, r) = places[members[next]];
-                for other in 0..cells.len() {
-                    let (q, s) = places[other];
-                    if cluster[other] == usize::MAX && p.distance(q) < 1.2 * (r + s) + 1e-9 {
-                        cluster[other] = clusters.len();
-                        members.push(other);
-                    }
-                }
-                next += 1;
-            }
-            clusters.push(members);
-        }
         let mut done = vec![false; cells.len()];
-        for members in clusters {
+        for members in boxes::clusters(&places) {
             let center = members.iter().map(|&m| places[m].0).sum::<DVec3>() / members.len() as f64;
             let extent = members.iter().map(|&m| places[m].0.distance(center) + places[m].1).fold(0.0, f64::max);
             if extent > 0.02 {
