@@ -3,13 +3,15 @@
 #![cfg(feature = "editor")]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test helper may stop the test")]
 
+#[path = "support/bad_bodies.rs"]
+mod bad_bodies;
 #[path = "support/window.rs"]
 mod window;
 
 use egui::{Event, Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use patchwright::model::spec::{HealSpec, PatchSpec, Piece};
-use patchwright::ui::{Action, Tool};
+use patchwright::ui::{Action, Options, Page, Tool};
 use patchwright::view::patch_tool::Event as PatchEvent;
 use window::*;
 
@@ -94,4 +96,26 @@ fn a_file_that_cannot_be_written_is_explained_and_the_work_stays_unsaved() {
         key(&mut window, Modifiers::NONE, Key::Escape);
     }
     assert_eq!(std::fs::read_to_string(&file).unwrap(), "in the way");
+}
+
+#[test]
+fn bad_meshes_and_grids_are_shown_and_the_report_says_what_is_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    for bad in bad_bodies::bad_bodies() {
+        let path = folder.path().join(bad.name);
+        std::fs::write(&path, &bad.bytes).unwrap();
+        let mut window = window::window(builder(), Options { files: vec![path], ..Options::default() });
+        let editor = &mut window.state_mut().editor;
+        assert!(editor.dialog.is_none(), "{}", bad.name);
+        assert_eq!(editor.viewport.scene.counts().0, bad.triangles, "{}", bad.name);
+        // What was left out comes to the front by itself.
+        assert_eq!(editor.page == Page::Report, bad.skipped, "{}", bad.name);
+        editor.show_page(Page::Report);
+        settle(&mut window);
+        for reason in bad.said {
+            assert!(window.query_by_label_contains(reason).is_some(), "{}: {reason}", bad.name);
+        }
+        let calm = bad.said.is_empty();
+        assert_eq!(window.query_by_label_contains("Everything was read as it stands").is_some(), calm, "{}", bad.name);
+    }
 }

@@ -98,13 +98,14 @@ fn note_defects(mesh: &TriMesh, kind: &str, report: &mut ImportReport) {
         return;
     }
     let defects = mesh.defects();
-    for (count, what) in [
-        (defects.degenerate, "triangles without area"),
-        (defects.duplicate, "triangles with the corners of another one"),
-        (defects.non_manifold_edges, "edges of more than two triangles"),
+    for (count, noun, what) in [
+        (defects.degenerate, "triangle", "without area"),
+        (defects.duplicate, "triangle", "with the corners of another one"),
+        (defects.non_manifold_edges, "edge", "of more than two triangles"),
     ] {
+        let (plural, are) = if count == 1 { ("", "it is") } else { ("s", "they are") };
         if count > 0 {
-            report.add(Severity::Warning, kind, None, None, format!("{count} {what}, kept as they are"));
+            report.add(Severity::Warning, kind, None, None, format!("{count} {noun}{plural} {what}, kept as {are}"));
         }
     }
 }
