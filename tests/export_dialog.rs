@@ -60,3 +60,24 @@ fn the_dialog_tells_gap_and_angle_and_writes_what_it_told() {
     assert_eq!((loops.len(), inner.non_manifold_edges), (1, 0), "floor and roof are one sheet");
     assert!(window.query_by_label_contains("largest gap between edges that meet").is_some());
 }
+
+/// STEP was offered first for every model, and said at once that it cannot hold a mesh.
+#[test]
+fn what_is_offered_first_can_hold_the_model() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text, path) in [
+        ("sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "sheet-exported.stl"),
+        ("grid.fmt", "2 2 1\n0 1 0 1\n0 0 1 1\n4*0.0\n", "grid-exported.xyz"),
+    ] {
+        let model = folder.path().join(name);
+        std::fs::write(&model, text).unwrap();
+        let mut window = window(builder(), Options { files: vec![model], ..Options::default() });
+        key(&mut window, Modifiers::COMMAND, Key::E);
+        settle(&mut window);
+        assert!(window.query_by_label_contains("nothing that").is_none(), "{name}");
+        assert!(window.query_by_label_contains("Meshes and blocks as they are").is_some(), "{name}");
+        key(&mut window, Modifiers::NONE, Key::Enter);
+        settle(&mut window);
+        assert!(folder.path().join(path).exists(), "{name}: {path} was not written");
+    }
+}

@@ -52,10 +52,11 @@ pub struct ExportForm {
 impl ExportForm {
     fn new(document: &Document, path: String) -> Self {
         let which = if document.patches().next().is_some() { Which::Patches } else { Which::Visible };
+        let format = first_format(document);
         Self {
             which,
-            format: Format::Step,
-            by_tolerance: false,
+            format,
+            by_tolerance: by_tolerance(format),
             points: POINTS,
             chord: export::CHORD * document.bounds().diagonal(),
             spacing: Spacing::Uniform,
@@ -129,15 +130,9 @@ impl ExportForm {
                 ui.selectable_value(&mut self.format, format, format.name());
             }
             if self.format != before {
-                self.by_tolerance = self.format != Format::Plot3d;
-                let extension = match self.format {
-                    Format::Step => "step",
-                    Format::Iges => "igs",
-                    Format::Stl => "stl",
-                    Format::Obj => "obj",
-                    _ => "xyz",
-                };
-                self.path.text = PathBuf::from(&self.path.text).with_extension(extension).display().to_string();
+                self.by_tolerance = by_tolerance(self.format);
+                let path = PathBuf::from(&self.path.text).with_extension(extension(self.format));
+                self.path.text = path.display().to_string();
             }
         });
         ui.end_row();
@@ -276,10 +271,40 @@ fn part(document: &Document, which: Which) -> Document {
     out
 }
 
+/// The format that is offered first: STEP, unless there is nothing that it can hold.
+fn first_format(document: &Document) -> Format {
+    let has = |which: fn(&Shape) -> bool| document.entities().iter().any(|e| which(&e.shape));
+    if has(|s| !matches!(s, Shape::Mesh(_) | Shape::Block(_))) {
+        Format::Step
+    } else if has(|s| matches!(s, Shape::Block(_))) {
+        Format::Plot3d
+    } else if has(|s| matches!(s, Shape::Mesh(_))) {
+        Format::Stl
+    } else {
+        Format::Step
+    }
+}
+
+/// Whether surfaces are first divided by tolerance rather than by counts.
+fn by_tolerance(format: Format) -> bool {
+    !matches!(format, Format::Plot3d | Format::Step | Format::Iges)
+}
+
+fn extension(format: Format) -> &'static str {
+    match format {
+        Format::Step => "step",
+        Format::Iges => "igs",
+        Format::Stl => "stl",
+        Format::Obj => "obj",
+        _ => "xyz",
+    }
+}
+
 impl Editor {
     /// Opens the export dialog.
     pub fn ask_export(&mut self) {
-        let path = self.beside_source("patches.step");
+        let what = if self.document().patches().next().is_some() { "patches" } else { "exported" };
+        let path = self.beside_source(&format!("{what}.{}", extension(first_format(self.document()))));
         self.dialog = Some(Dialog::Export(Box::new(ExportForm::new(self.document(), path))));
     }
 

@@ -47,7 +47,7 @@ pub enum FacetCurveKind {
 pub struct FacetCurve {
     /// What it is.
     pub kind: FacetCurveKind,
-    /// Its name for people: "border 3", "face 0, i = 4".
+    /// Its name for people: "border 3", "k max, i = 4".
     pub name: String,
     /// The polyline as a curve of degree 1.
     pub curve: Curve,
@@ -294,10 +294,10 @@ fn grid_curves(grid: &Grid) -> Vec<FacetCurve> {
     let faces = grid.surfaces();
     let several = faces.len() > 1;
     let mut out = Vec::new();
-    for (number, face) in faces.iter().enumerate() {
+    for (number, (face, [first, second])) in faces.iter().zip(grid.directions()).enumerate() {
         let [ni, nj, _] = face.counts();
         let mut line = |kind, name: String, chosen: Vec<usize>| {
-            let name = if several { format!("{} {name}", Grid::FACES[number]) } else { name };
+            let name = if several { format!("{}, {name}", Grid::FACES[number]) } else { name };
             // Points that are blanked out break the line.
             for run in chosen.split(|&k| face.blank().is_some_and(|b| b[k] == 0)) {
                 let points: Vec<DVec3> = run.iter().map(|&k| face.points()[k]).collect();
@@ -312,10 +312,10 @@ fn grid_curves(grid: &Grid) -> Vec<FacetCurve> {
             if at == 0 || at + 1 == count { FacetCurveKind::GridBorder } else { FacetCurveKind::GridLine }
         };
         for j in 0..nj {
-            line(kind(j, nj), format!("j = {j}"), (0..ni).map(|i| j * ni + i).collect());
+            line(kind(j, nj), format!("{second} = {j}"), (0..ni).map(|i| j * ni + i).collect());
         }
         for i in 0..ni {
-            line(kind(i, ni), format!("i = {i}"), (0..nj).map(|j| j * ni + i).collect());
+            line(kind(i, ni), format!("{first} = {i}"), (0..nj).map(|j| j * ni + i).collect());
         }
     }
     out
@@ -391,6 +391,9 @@ mod tests {
         // Each pair of faces has its two counts of lines: 2 (4 + 5) + 2 (3 + 5) + 2 (3 + 4).
         assert_eq!(facets.curves().len(), 48);
         assert_eq!(facets.curves().iter().filter(|c| c.kind == FacetCurveKind::GridBorder).count(), 24);
+        // A line is named as the block counts: on the face i = 0 lie lines of constant j and k.
+        let named = facets.curves().iter().find(|c| c.name == "i min, k = 3").unwrap();
+        assert!(named.curve.points().iter().all(|p| p.x == 0.0 && p.z == 3.0));
         assert!((facets.mesh().area() - 2.0 * (6.0 + 8.0 + 12.0)).abs() < 1e-12);
         // All six faces look outwards, also when k runs down.
         assert!((facets.mesh().volume() - 24.0).abs() < 1e-12);

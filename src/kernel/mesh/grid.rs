@@ -83,6 +83,18 @@ impl Grid {
         faces
     }
 
+    /// What the block calls the two directions of each of [`Self::surfaces`].
+    pub fn directions(&self) -> Vec<[char; 2]> {
+        const IJK: [char; 3] = ['i', 'j', 'k'];
+        if self.counts.contains(&1) {
+            // Those that run come first; of a line or a point the others make up the number.
+            let (runs, rests): (Vec<usize>, Vec<usize>) = (0..3).partition(|&d| self.counts[d] > 1);
+            let order = [runs, rests].concat();
+            return vec![[IJK[order[0]], IJK[order[1]]]];
+        }
+        [['j', 'k'], ['i', 'k'], ['i', 'j']].into_iter().flat_map(|pair| [pair; 2]).collect()
+    }
+
     /// A surface grid with its count of 1 moved to the end.
     fn flattened(&self) -> Self {
         let mut counts: Vec<usize> = self.counts.iter().copied().filter(|&c| c > 1).collect();
@@ -141,6 +153,19 @@ mod tests {
             let faces = block(counts).surfaces();
             assert_eq!(faces.len(), 1);
             assert_eq!(faces[0].triangulated().unwrap().area(), 6.0);
+        }
+    }
+
+    #[test]
+    fn directions_are_those_along_which_the_points_of_a_face_run() {
+        for counts in [[3, 4, 5], [1, 4, 3], [4, 1, 3], [4, 3, 1]] {
+            let grid = block(counts);
+            for (face, directions) in grid.surfaces().iter().zip(grid.directions()) {
+                let steps = [1, face.counts()[0]].map(|k| face.points()[k] - face.points()[0]);
+                let axis = |c: char| [DVec3::X, DVec3::Y, DVec3::Z]["ijk".find(c).unwrap()];
+                assert_eq!(steps, directions.map(axis), "{counts:?}");
+            }
+            assert_eq!(grid.surfaces().len(), grid.directions().len());
         }
     }
 
