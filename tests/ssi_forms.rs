@@ -12,6 +12,7 @@ use forms::{cylinder, graph, rectangle, sphere, torus};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use patchwright::kernel::geom::{Direction, Knots, Surface};
 use patchwright::kernel::job::Job;
+use patchwright::kernel::ssi::result::CurveEnd;
 use patchwright::kernel::ssi::result::{CurveKind, JunctionKind};
 use patchwright::kernel::ssi::{Intersection, SsiError, SsiOptions, intersect};
 
@@ -234,6 +235,15 @@ fn degenerate_borders_cost_neither_nodes_nor_entries_without_end() {
     let contour: Vec<DVec3> = (0..=2000).map(|k| lens.eval(glam::DVec2::new(0.0, f64::from(k) / 2000.0))).collect();
     let length: f64 = contour.windows(2).map(|w| w[0].distance(w[1])).sum();
     assert!(edge > 0.999 * length, "the common edge is {edge} of {length}");
+    // Once it was there twice or three times, with a curve of no length in the pole.
+    for (a, b) in [(&lens, &wall), (&wall, &lens), (&lens.reversed(Direction::V).reversed(Direction::U), &wall)] {
+        let result = meet(a, b);
+        let [curve] = &result.curves[..] else { panic!("the common edge is one curve") };
+        let own: f64 = curve.points.windows(2).map(|w| w[0].xyz.distance(w[1].xyz)).sum();
+        assert!((own - length).abs() < 1e-4 * length, "{own} of {length}");
+        // Where the cusp is too thin to follow the edge to its end, the answer says so.
+        assert!(curve.ends.iter().all(|e| *e == CurveEnd::Boundary) || !result.complete);
+    }
     // The same half written the other way round, and the other half of the airfoil.
     let again = lens.reversed(Direction::V).reversed(Direction::U);
     let mirrored = {

@@ -85,6 +85,17 @@ fn growth(start: &Instant) {
         println!("{n:2} x {n:<2} spans {ms:>10.2} {factor}");
         last = Some(ms);
     }
+    println!("\nthe same for a surface with itself: one region");
+    let mut last: Option<f64> = None;
+    for n in [5, 10, 20, 40] {
+        let Some(surface) = spline_graph(n, 1, 0.0) else { continue };
+        let before = clock(start);
+        let _ = black_box(intersect(&[(0, &surface)], &[(1, &surface)], &SsiOptions::default(), &Job::new()));
+        let ms = clock(start) - before;
+        let factor = last.map_or(String::new(), |l| format!("x {:.2}", ms / l));
+        println!("{n:2} x {n:<2} spans {ms:>10.2} {factor}");
+        last = Some(ms);
+    }
 }
 
 /// Table 8.4 of the thesis: overlapping leaves of two cylinders at H = 9. Its cylinders' length is not given, so that

@@ -24,6 +24,7 @@ use super::junction::{Contacted, arms_of, is_point};
 use super::output;
 use super::piece::Patch;
 use super::region::{self, CoincidentRegion};
+use super::repeated;
 use super::result::{Counts, CurveEnd, Intersection, Times, Unresolved};
 use super::side::{Frame, Side};
 use super::tangency::from_tori;
@@ -250,6 +251,7 @@ impl Engine {
             self.trace_arc(arc);
             job.progress(0.5 + 0.5 * (k + traversal.findings.seeds.len()) as f64 / total);
         }
+        repeated::drop_repeats(self);
         self.regions = region::regions(self, &coincident, job);
         go_on()?;
         self.open_pairs(&traversal.unresolved);

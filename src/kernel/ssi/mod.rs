@@ -20,6 +20,7 @@ mod output;
 pub mod pairs;
 mod piece;
 mod region;
+mod repeated;
 pub mod result;
 mod seam;
 mod side;
