@@ -159,23 +159,23 @@ pub fn fit(a: &Piece, node: &Node, b: &Piece, other: &Node) -> Option<Contact> {
         return None;
     }
     let frame = frame_across(n);
-    let at = |x: f64, y: f64| node.low + (node.high - node.low) * DVec2::new(x, y);
-    let sample = |x: f64, y: f64, start: DVec2| -> Option<(f64, DVec2)> {
-        let ja = a.jet1(at(x, y));
-        let (st, jb) = foot_along(b, ja.p, frame, start)?;
-        let steep = |jet: &super::piece::Jet1| {
-            let cross = jet.cross();
-            cross.dot(n).abs() < 0.3 * cross.length()
-        };
-        if steep(&ja) || steep(&jb) || st.min_element() < -1.0 || st.max_element() > 2.0 {
+    // A's normals over the node are near n: both nodes are flat, and n is halfway between them.
+    let foot = |p: DVec3, start: DVec2| -> Option<(f64, DVec2)> {
+        let (st, jb) = foot_along(b, p, frame, start)?;
+        let cross = jb.cross();
+        let steep = cross.dot(n).abs() < 0.3 * cross.length();
+        if steep || st.min_element() < -1.0 || st.max_element() > 2.0 {
             return None;
         }
-        Some(((ja.p - jb.p).dot(n), st))
+        Some(((p - jb.p).dot(n), st))
     };
-    // The foot of the middle, then outwards from there, each predicted from those that are known.
-    let (_, center) = sample(0.5, 0.5, other.local(DVec2::ZERO))?;
     let nodes: [f64; DEGREE + 1] = std::array::from_fn(|i| chebyshev_node(DEGREE, i));
+    let along = |k: usize| nodes.map(|x| node.low[k] + (node.high[k] - node.low[k]) * x);
+    let points = a.grid(&along(0), &along(1));
     const W: usize = DEGREE + 1;
+    let sample = |i: usize, j: usize, start: DVec2| foot(points[j * W + i], start);
+    // The foot of the middle, then outwards from there, each predicted from those that are known.
+    let (_, center) = sample(DEGREE / 2, DEGREE / 2, other.local(DVec2::ZERO))?;
     const M: usize = DEGREE / 2;
     let mut g = vec![0.0; W * W];
     let mut feet = [[DVec2::ZERO; W]; W];
@@ -186,7 +186,7 @@ pub fn fit(a: &Piece, node: &Node, b: &Piece, other: &Node) -> Option<Contact> {
             1 if j < M => feet[M][M],
             _ => extrapolated(j, |j| feet[j][M]),
         };
-        (g[j * W + M], feet[j][M]) = sample(0.5, nodes[j], start)?;
+        (g[j * W + M], feet[j][M]) = sample(M, j, start)?;
     }
     if rough(|j| g[j * W + M]) {
         return None;
@@ -200,7 +200,7 @@ pub fn fit(a: &Piece, node: &Node, b: &Piece, other: &Node) -> Option<Contact> {
                 let step = if j == M { DVec2::ZERO } else { feet[inner_row][i] - feet[inner_row][i + 1] };
                 feet[j][i + 1] + step
             };
-            (g[j * W + i], feet[j][i]) = sample(nodes[i], nodes[j], start)?;
+            (g[j * W + i], feet[j][i]) = sample(i, j, start)?;
         }
         if j == M && rough(|i| g[M * W + i]) {
             return None;
@@ -213,7 +213,8 @@ pub fn fit(a: &Piece, node: &Node, b: &Piece, other: &Node) -> Option<Contact> {
     let mut error = ROUNDING;
     for (x, y) in [(0.02, 0.5), (0.98, 0.41), (0.31, 0.02), (0.62, 0.98), (0.31, 0.69), (0.69, 0.12)] {
         let near = |x: f64| (0..W).min_by(|&i, &k| (nodes[i] - x).abs().total_cmp(&(nodes[k] - x).abs())).unwrap_or(M);
-        let (gap, _) = sample(x, y, feet[near(y)][near(x)])?;
+        let p = a.point(node.low + (node.high - node.low) * DVec2::new(x, y));
+        let (gap, _) = foot(p, feet[near(y)][near(x)])?;
         error = f64::max(error, 4.0 * (gap - g.value(x, y)).abs() + ROUNDING);
         if error > allowed {
             return None;

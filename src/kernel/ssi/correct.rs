@@ -145,6 +145,7 @@ pub fn correct(
 }
 
 /// Solves four equations in four unknowns (the fifth column is the right-hand side).
+#[inline(always)]
 fn solve4(mut m: [[f64; 5]; 4]) -> Option<[f64; 4]> {
     for row in &mut m {
         let size = row[..4].iter().fold(0.0, |s: f64, v| s.max(v.abs()));

@@ -10,7 +10,7 @@ use super::engine::{Chain, Engine};
 use super::piece::{Patch, Piece};
 use super::region::RegionPoint;
 use super::result::{CurveEnd, CurveKind, CurvePoint, Intersection, IntersectionCurve, Junction, JunctionKind, Region};
-use super::trace::{Mode, TraceNode, Tracer, hermite};
+use super::trace::{Mode, TraceNode, Tracer, along, hermite};
 
 /// How often the stretch between two traced points is divided again.
 const DEEPEST: usize = 6;
@@ -150,7 +150,7 @@ pub fn point_of(engine: &Engine, node: &TraceNode) -> CurvePoint {
 }
 
 fn curve(engine: &Engine, tracer: &Tracer<'_>, bounds: &mut Bounds, chain: &Chain, tol: f64) -> IntersectionCurve {
-    let wanted = 0.9 * tol * engine.frame.scale;
+    let wanted = 0.98 * tol * engine.frame.scale;
     let mut bound: f64 = 0.0;
     let mut points: Vec<CurvePoint> = Vec::with_capacity(chain.nodes.len() * 2);
     let mut push = |node: &TraceNode| {
@@ -189,7 +189,7 @@ fn curve(engine: &Engine, tracer: &Tracer<'_>, bounds: &mut Bounds, chain: &Chai
                 push(&y);
                 continue;
             }
-            let parts = (here / (0.9 * wanted)).sqrt().ceil().clamp(2.0, MOST_PARTS);
+            let parts = (here / (0.95 * wanted)).sqrt().ceil().clamp(2.0, MOST_PARTS);
             let mut last = y;
             for j in (1..parts as usize).rev() {
                 let next = settled(engine, &between(tracer, chain.mode, &x, &y, j as f64 / parts));
@@ -283,13 +283,14 @@ fn between(tracer: &Tracer<'_>, mode: Mode, from: &TraceNode, to: &TraceNode, f:
     let pair = [from.pa, from.pb];
     let chord = (to.p - from.p).normalize_or_zero();
     let (a, b) = (&tracer.sides[0].pieces[pair[0]], &tracer.sides[1].pieces[pair[1]]);
-    let (on_a, on_b) = (a.point(at.uv), b.point(at.st));
-    let p = 0.5 * (on_a + on_b);
-    let condition = Condition::Plane { point: p, direction: chord };
     let length = from.p.distance(to.p);
+    let p = along(from, to, f);
+    let condition = Condition::Plane { point: p, direction: chord };
     let found = tracer.locate(mode, pair, at, condition, chord);
     let inside = |x: &PointPair| x.to_array().iter().all(|v| (-1e-6..=1.0 + 1e-6).contains(v));
     found.filter(|n| n.p.distance(p) < 0.1 * length && inside(&n.at)).unwrap_or_else(|| {
+        let (on_a, on_b) = (a.point(at.uv), b.point(at.st));
+        let p = 0.5 * (on_a + on_b);
         let rates = std::array::from_fn(|k| from.rates[k] * (1.0 - f) + to.rates[k] * f);
         TraceNode { at, p, tangent: chord, rates, off: 0.5 * on_a.distance(on_b), ..*from }
     })

@@ -118,12 +118,22 @@ impl TraceNode {
     }
 }
 
+/// The weights of both points, and of their derivatives by arc length.
+fn hermite_weights(a: &TraceNode, b: &TraceNode, f: f64) -> [f64; 4] {
+    let (h, g) = (a.p.distance(b.p), 1.0 - f);
+    [g * g * (1.0 + 2.0 * f), f * f * (3.0 - 2.0 * f), g * g * f * h, -f * f * g * h]
+}
+
+/// The point at a fraction between two points of the same pair of pieces.
+pub fn along(a: &TraceNode, b: &TraceNode, f: f64) -> DVec3 {
+    let [wa, wb, ta, tb] = hermite_weights(a, b, f);
+    a.p * wa + b.p * wb + a.tangent * ta + b.tangent * tb
+}
+
 /// The parameters at a fraction between two points of the same pair of pieces.
 pub fn hermite(a: &TraceNode, b: &TraceNode, f: f64) -> PointPair {
-    let h = a.p.distance(b.p);
     let (x, y) = (a.at.to_array(), b.at.to_array());
-    let g = 1.0 - f;
-    let weights = [g * g * (1.0 + 2.0 * f), f * f * (3.0 - 2.0 * f), g * g * f * h, -f * f * g * h];
+    let weights = hermite_weights(a, b, f);
     let mut out = [0.0; 4];
     for (k, out) in out.iter_mut().enumerate() {
         *out = weights[0] * x[k] + weights[1] * y[k] + weights[2] * a.rates[k] + weights[3] * b.rates[k];
