@@ -342,6 +342,19 @@ mod tests {
         assert_eq!(found.count(EdgeKind::NonManifold), 3, "{:?}", found.pieces);
     }
 
+    /// The edges of a solid block were called free, although two of its faces meet in each.
+    #[test]
+    fn a_solid_block_has_feature_edges_and_a_sheet_of_points_free_ones() {
+        use crate::kernel::mesh::{facets::Facets, grid::Grid};
+        for (counts, kind, pieces) in [([3, 4, 5], EdgeKind::Feature, 24), ([3, 4, 1], EdgeKind::Free, 4)] {
+            let [ni, nj, nk] = counts;
+            let at = |k: usize| DVec3::new((k % ni) as f64, (k / ni % nj) as f64, (k / (ni * nj)) as f64);
+            let grid = Grid::new(counts, (0..ni * nj * nk).map(at).collect(), None).unwrap();
+            let (_, found) = edges(vec![Shape::Block(Arc::new(Facets::of_block(grid).unwrap()))], 1e-3);
+            assert_eq!((found.count(kind), found.pieces.len()), (pieces, pieces), "{:?}", found.pieces);
+        }
+    }
+
     #[test]
     fn a_cancelled_search_says_so() {
         let mut document = Document::new(Unit::Millimetre);

@@ -8,8 +8,8 @@
 //! ends, is no neighbour but the border itself. The normal at a border is the mean of those of the triangles at its
 //! vertices, weighted by area.
 //!
-//! Feature edges of a mesh stay what they are, and so do the border lines of a block that is a solid where nothing else
-//! is near. Cost: a closest point a sample and neighbour, and one look at every triangle.
+//! Feature edges of a mesh stay what they are; the border lines of a block that is a solid are feature edges where nothing
+//! else is near, as two of its faces meet there. Cost: a closest point a sample and neighbour, and one look at every triangle.
 
 use std::collections::HashMap;
 
@@ -164,6 +164,7 @@ pub(super) fn rims(parts: &[Part], own: &Part, options: &EdgeOptions, job: &Job,
     let rims = Rims::new(facets);
     // The faces of a block meet in its border lines: only a mesh can lie on itself.
     let mesh = facets.grid().is_none();
+    let solid = facets.grid().is_some_and(|grid| !grid.counts().contains(&1) && grid.blank().is_none());
     let pieces: Vec<Vec<EdgePiece>> = facets
         .curves()
         .par_iter()
@@ -196,6 +197,9 @@ pub(super) fn rims(parts: &[Part], own: &Part, options: &EdgeOptions, job: &Job,
             };
             let mut pieces = Vec::new();
             stretches(curve, range, &places(&chain.curve.knots().breaks(), options), look, options, &mut pieces);
+            for piece in pieces.iter_mut().filter(|piece| solid && piece.kind == EdgeKind::Free) {
+                piece.kind = EdgeKind::Feature;
+            }
             pieces
         })
         .collect();
