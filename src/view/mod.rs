@@ -3,6 +3,7 @@
 
 pub mod camera;
 pub mod colormap;
+mod detail;
 pub mod deviation;
 pub mod display;
 mod facet_shading;
