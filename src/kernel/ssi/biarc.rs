@@ -1,8 +1,8 @@
 //! Intersection curves as matched G1 biarcs in both parameter domains (thesis 5.2.1), with the error bound of 5.2.2.
 //!
 //! Between two points of the curve with their directions in a domain lie two circular arcs that meet with a common
-//! tangent (Bolton, "Biarc curves", CAD 7 (1975), with equal tangent lengths). A segment is refined, at the point where
-//! it is worst, until |S_A(u, v) - S_B(s, t)| along the matched pair of biarcs is bounded below the tolerance by
+//! tangent (Bolton, "Biarc curves", CAD 7 (1975), with equal tangent lengths). A segment is refined ([`super::refined`])
+//! until |S_A(u, v) - S_B(s, t)| along the matched pair of biarcs is bounded below the tolerance by
 //! samples and Filip's term, so that each of the two curves on surfaces is within the tolerance of the other surface.
 //! Segments are u- or v-monotone in both domains and run from piece border to piece border, junction or end.
 //!
@@ -14,6 +14,7 @@
 use glam::{DVec2, DVec3};
 
 use super::derivative_bounds::filip;
+use super::refined::{Element, refined};
 use super::result::IntersectionCurve;
 use super::spline_fit::{FitError, prepared};
 use super::strand::{Ground, Knot, Strand};
@@ -162,7 +163,11 @@ pub fn fit_biarcs(curve: &IntersectionCurve, surfaces: &[(usize, &Surface)], tol
         }
         let Some(run) = runs.last_mut() else { continue };
         for part in monotone(&strand.knots) {
-            segments(&ground, strand, part, wanted, &mut run.pairs);
+            let tried = |x: &Knot, y: &Knot| {
+                Some(Tried { ground: &ground, strand, wanted, from: x.t, to: y.t, pair: pair_between(x, y)? })
+            };
+            let pairs = refined(&ground, strand, part, wanted, tried).into_iter();
+            run.pairs.extend(pairs.map(|(t, _, bound)| BiarcPair { bound: bound / ground.frame.scale, ..t.pair }));
         }
     }
     runs.retain(|run| !run.pairs.is_empty());
@@ -202,47 +207,29 @@ fn monotone(knots: &[Knot]) -> Vec<&[Knot]> {
     out
 }
 
-/// The biarcs over a run of points, refined until the bound holds or nothing more can be done.
-fn segments(ground: &Ground, strand: &Strand, knots: &[Knot], wanted: f64, out: &mut Vec<BiarcPair>) {
-    let mut stack = vec![(knots.to_vec(), 0)];
-    while let Some((knots, depth)) = stack.pop() {
-        let last = knots.len() - 1;
-        let (x, y) = (knots[0], knots[last]);
-        let pair = pair_between(&x, &y);
-        let mut worst = None;
-        if let Some(pair) = pair {
-            let off = |k: &Knot| {
-                let at = pair.at((k.t - x.t) / (y.t - x.t));
-                [0, 1]
-                    .map(|side| ground.point(strand.pieces[side], at[side]).distance(k.p))
-                    .into_iter()
-                    .fold(0.0, f64::max)
-            };
-            worst = knots[1..last].iter().map(off).enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
-            if worst.is_none_or(|(_, off)| off < wanted) {
-                let hopeless = last == 1 && depth > 12;
-                let bound = bounded(ground, strand, &pair, wanted, !hopeless);
-                if bound <= wanted || hopeless {
-                    out.push(BiarcPair { bound: bound / ground.frame.scale, ..pair });
-                    continue;
-                }
-            }
-        } else if last == 1 && depth > 12 {
-            continue; // a stretch that is a point in one of the domains
-        }
-        if last == 1 {
-            let middle = ground.between(strand, &x, &y);
-            stack.push((vec![middle, y], depth + 1));
-            stack.push((vec![x, middle], depth + 1));
-        } else {
-            let margin = last / 4;
-            let cut = worst.map_or(last / 2, |(k, _)| k + 1).clamp(margin.max(1), (last - margin).min(last - 1));
-            stack.push((knots[cut..].to_vec(), depth));
-            stack.push((knots[..=cut].to_vec(), depth));
-        }
+/// A pair of biarcs between two points.
+struct Tried<'a> {
+    ground: &'a Ground,
+    strand: &'a Strand,
+    wanted: f64,
+    from: f64,
+    to: f64,
+    pair: BiarcPair,
+}
+
+impl Element for Tried<'_> {
+    fn off(&self, k: &Knot) -> f64 {
+        let at = self.pair.at((k.t - self.from) / (self.to - self.from));
+        let on = |side: usize| self.ground.point(self.strand.pieces[side], at[side]).distance(k.p);
+        on(0).max(on(1))
+    }
+
+    fn bound(&self, hasty: bool) -> f64 {
+        bounded(self.ground, self.strand, &self.pair, self.wanted, hasty)
     }
 }
 
+/// `None` for a stretch that is a point in one of the domains.
 fn pair_between(x: &Knot, y: &Knot) -> Option<BiarcPair> {
     let h = y.t - x.t;
     let arcs = |side: usize| {

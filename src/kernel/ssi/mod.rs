@@ -19,6 +19,7 @@ mod junction;
 mod output;
 pub mod pairs;
 mod piece;
+mod refined;
 mod region;
 mod repeated;
 pub mod result;

@@ -3,7 +3,7 @@
 //! All curves of a fit share one parameter, the arc length by chords, so that the same parameter names the same point
 //! in space and on each surface. Every span is the cubic Hermite interpolant of exact points and derivatives: C1, double
 //! inner knots; triple ones where the curve turns a corner or the parametrization of a surface has a kink. Spans are
-//! as long as the tolerance allows: a span is cut at the point where it is worst until the bound holds.
+//! as long as the tolerance allows ([`super::refined`]).
 //!
 //! The bound is that of thesis 5.2.2 for the curve in space against each surface: with C(t) the curve and (u, v)(t)
 //! its preimage, |C(t) - S(u(t), v(t))| by sampling and Filip's term ([`super::derivative_bounds::filip`]).
@@ -13,6 +13,7 @@
 use glam::{DVec2, DVec3};
 
 use super::derivative_bounds::filip;
+use super::refined::{Element, refined};
 use super::result::IntersectionCurve;
 use super::strand::{Ground, Knot, Strand};
 use crate::kernel::geom::{Curve, Knots, Surface};
@@ -71,8 +72,22 @@ pub enum FitError {
 
 /// A cubic span between two knots.
 struct Span<'a> {
-    x: &'a Knot,
-    y: &'a Knot,
+    ground: &'a Ground,
+    strand: &'a Strand,
+    wanted: f64,
+    x: Knot,
+    y: Knot,
+}
+
+impl Element for Span<'_> {
+    fn off(&self, k: &Knot) -> f64 {
+        let on = |side: usize| self.ground.point(self.strand.pieces[side], self.domain(side, k.t)).distance(k.p);
+        on(0).max(on(1)).max(self.space(k.t).distance(k.p))
+    }
+
+    fn bound(&self, hasty: bool) -> f64 {
+        self.to_side(0, hasty).max(self.to_side(1, hasty))
+    }
 }
 
 impl Span<'_> {
@@ -94,7 +109,8 @@ impl Span<'_> {
     }
 
     /// An upper bound of the distance between the curve in space and its preimage on one side.
-    fn bound(&self, ground: &Ground, piece: usize, side: usize, wanted: f64, hasty: bool) -> f64 {
+    fn to_side(&self, side: usize, hasty: bool) -> f64 {
+        let (ground, piece, wanted) = (self.ground, self.strand.pieces[side], self.wanted);
         let h = self.y.t - self.x.t;
         // Bezier points and with them bounds of the derivatives.
         let (a, b) = (self.x.p, self.y.p);
@@ -113,47 +129,10 @@ impl Span<'_> {
 
 /// The knots that a strand's fit keeps, and its bound in the unit frame.
 fn reduced(ground: &Ground, strand: &Strand, wanted: f64) -> (Vec<Knot>, f64) {
-    let mut kept = vec![strand.knots[0]];
-    let mut worst: f64 = 0.0;
-    let mut stack = vec![(strand.knots.clone(), 0)];
-    while let Some((knots, depth)) = stack.pop() {
-        let last = knots.len() - 1;
-        let (x, y) = (knots[0], knots[last]);
-        let span = Span { x: &x, y: &y };
-        let off = |k: &Knot| {
-            let on = [0, 1].map(|side| ground.point(strand.pieces[side], span.domain(side, k.t)).distance(k.p));
-            on[0].max(on[1]).max(span.space(k.t).distance(k.p))
-        };
-        let inner = knots[1..last].iter().map(off).enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
-        if inner.is_none_or(|(_, off)| off < wanted) {
-            let bounds = [0, 1].map(|side| span.bound(ground, strand.pieces[side], side, wanted, true));
-            let bound = bounds[0].max(bounds[1]);
-            if bound <= wanted {
-                worst = worst.max(bound);
-                kept.push(y);
-                continue;
-            }
-            if last == 1 && depth > 12 {
-                // As good as it gets: measure without giving up early.
-                let bounds = [0, 1].map(|side| span.bound(ground, strand.pieces[side], side, wanted, false));
-                worst = worst.max(bounds[0]).max(bounds[1]);
-                kept.push(y);
-                continue;
-            }
-        }
-        if last == 1 {
-            let middle = ground.between(strand, &x, &y);
-            stack.push((vec![middle, y], depth + 1));
-            stack.push((vec![x, middle], depth + 1));
-        } else {
-            // Where it is worst, but not next to an end.
-            let margin = last / 4;
-            let cut = inner.map_or(last / 2, |(k, _)| k + 1).clamp(margin.max(1), (last - margin).min(last - 1));
-            stack.push((knots[cut..].to_vec(), depth));
-            stack.push((knots[..=cut].to_vec(), depth));
-        }
-    }
-    (kept, worst)
+    let span = |x: &Knot, y: &Knot| Some(Span { ground, strand, wanted, x: *x, y: *y });
+    let spans = refined(ground, strand, &strand.knots, wanted, span);
+    let worst = spans.iter().map(|(.., bound)| *bound).fold(0.0, f64::max);
+    (std::iter::once(strand.knots[0]).chain(spans.into_iter().map(|(_, end, _)| end)).collect(), worst)
 }
 
 /// Fits cubic B-splines to an intersection curve; `surfaces` must hold those that its points name, `tol` is in model
