@@ -330,7 +330,7 @@ impl eframe::App for App {
         self.title(&ctx);
         if !self.editor.jobs.active().is_empty() {
             // Progress moves although nobody touches the mouse.
-            ctx.request_repaint_after(Duration::from_millis(60));
+            ctx.request_repaint_after(Duration::from_millis(100));
         }
         self.hint(&ctx);
         if self.clock.runs() {
