@@ -13,6 +13,8 @@ use glam::DVec3;
 use patchwright::kernel::geom::{Knots, Surface};
 use patchwright::model::document::{Document, Shape, Unit};
 use patchwright::ui::Options;
+use patchwright::view::intersection::Drawing;
+use patchwright::view::intersection::marks::Focus;
 use patchwright::view::uv::{UvGlyph, UvMark, UvShape};
 use window::*;
 
@@ -174,6 +176,36 @@ fn a_plane_is_swept_through_the_miter_point_of_the_cross_cap() {
     settle(&mut window);
     assert!(window.query_by_label_contains("Parabolic: a cusp").is_some());
     picture(&mut window, "plane_parabolic");
+}
+
+/// The area that two overlapping patches of one surface share.
+#[test]
+fn a_coincident_region_is_named_and_hatched() {
+    let k = Knots::bezier(2, 0.0, 1.0).unwrap();
+    let net = (0..9).map(|i| DVec3::new(f64::from(i % 3), f64::from(i / 3), if i == 4 { 1.5 } else { 0.0 })).collect();
+    let whole = Surface::new(k.clone(), k, net, None).unwrap();
+    let mut document = Document::new(Unit::Millimetre);
+    for (name, at) in [("lower", [0.0, 0.7]), ("upper", [0.3, 1.0])] {
+        document.add(name, Shape::Surface(Arc::new(whole.restricted(at, at).unwrap())), None);
+    }
+    let mut window = opened("surfaces_with_gap.igs");
+    window.state_mut().editor.show_document(document, None, "overlap".to_owned(), true);
+    settle(&mut window);
+    select(&mut window, &["lower", "upper"]);
+    key(&mut window, NONE, Key::X);
+    key(&mut window, NONE, Key::Enter);
+    let found = window.state().editor.found_intersection().unwrap();
+    assert_eq!((found.result.regions.len(), found.result.complete), (1, true));
+    let drawing = Drawing::new(found, Focus::default(), false);
+    let (lines, _) = &drawing.hatching;
+    assert!(lines.len() > 20);
+    // Every hatch line lies in the square that both cover.
+    for p in lines.iter().flatten() {
+        assert!(p.x > 0.6 - 1e-9 && p.x < 1.4 + 1e-9 && p.y > 0.6 - 1e-9 && p.y < 1.4 + 1e-9, "{p}");
+    }
+    assert!(window.query_by_label_contains("Coincident").is_some());
+    key(&mut window, NONE, Key::U);
+    picture(&mut window, "coincident");
 }
 
 /// Both preimages are in the uv view; the cursor's partners move with it.

@@ -66,9 +66,10 @@ pub struct Args {
     /// Width and height in pixels
     #[arg(long, value_name = "WxH", default_value = "1600x1000", value_parser = size)]
     pub size: [u32; 2],
-    /// What is drawn, all of it listed: shaded, edges, isolines, wireframe, xray, zebra, patches, deviation; bvh:N is
-    /// level N of the hierarchies as rectangle-swept spheres, spheres:N and boxes:N as those, each coloured by error or
-    /// by :level or :cone after it; tori:N is the leaf tori of height N
+    /// What is drawn, all of it listed: shaded, edges, isolines, wireframe, xray, untrimmed, zebra, patches, deviation,
+    /// intersections (of the surfaces with each other), self-intersections; bvh:N is level N of the hierarchies as
+    /// rectangle-swept spheres, spheres:N and boxes:N as those, each coloured by error or by :level or :cone after it;
+    /// tori:N is the leaf tori of height N
     #[arg(long, value_delimiter = ',', default_value = "shaded,edges", value_parser = layers::show)]
     pub show: Vec<Show>,
     /// From where
@@ -231,7 +232,14 @@ pub fn run(args: &Args, common: &Common) -> Result<Exit, CliError> {
         unresolved: found.iter().map(|f| f.result.unresolved.len()).sum(),
     });
     if let Some(f) = &intersections {
-        common.say(format!("{} intersection curves, {} points, {} unresolved", f.curves, f.points, f.unresolved));
+        let s = |n: usize| if n == 1 { "" } else { "s" };
+        let (curves, points) = (f.curves, f.points);
+        common.say(format!(
+            "{curves} intersection curve{}, {points} point{}, {} unresolved",
+            s(curves),
+            s(points),
+            f.unresolved
+        ));
     }
     let complete = intersections.as_ref().is_none_or(|f| f.complete);
     let adapter = offscreen.gpu().name.clone();

@@ -114,6 +114,12 @@ impl Sketch {
     /// wider one in the colour of the backdrop, so that it stands out from surfaces of any colour.
     pub fn intersection(&mut self, drawing: &Drawing, strength: f32, dark: bool) {
         let casing = with_alpha(srgb(if dark { 0x0b0d10 } else { 0xffffff }), 0.75 * strength);
+        let (hatching, rgb) = &drawing.hatching;
+        let color = with_alpha(srgb(*rgb), 0.8 * strength);
+        self.polylines(
+            hatching.iter().cloned(),
+            LineStyle { width: 1.2, color, dash: Dash::Solid, hidden: Hidden::Dashed },
+        );
         for line in &drawing.lines {
             let color = with_alpha(srgb(line.style.rgb), strength);
             let dash = match line.style.stroke {

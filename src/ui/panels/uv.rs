@@ -343,8 +343,8 @@ impl Pen<'_> {
                     UvDash::Solid => {
                         self.painter.add(Shape::line(run, stroke));
                     }
-                    UvDash::Long => self.painter.extend(Shape::dashed_line(&run, stroke, 9.0, 5.0)),
-                    UvDash::Short => self.painter.extend(Shape::dashed_line(&run, stroke, 4.0, 3.5)),
+                    UvDash::Long => self.painter.extend(Shape::dashed_line(&spaced(&run), stroke, 9.0, 5.0)),
+                    UvDash::Short => self.painter.extend(Shape::dashed_line(&spaced(&run), stroke, 4.0, 3.5)),
                 }
             }
         }
@@ -425,4 +425,18 @@ impl Pen<'_> {
         text(pos2(x, domain.top()), Align2::RIGHT_TOP, short(v1), t.text[1]);
         text(pos2(x, inner.center().y), Align2::RIGHT_CENTER, "v".to_owned(), t.text[1]);
     }
+}
+/// A polyline without points less than two pixels apart: what is drawn of a dash between two such is rounded away.
+fn spaced(run: &[Pos2]) -> Vec<Pos2> {
+    let mut out: Vec<Pos2> = run.first().copied().into_iter().collect();
+    for (k, &p) in run.iter().enumerate().skip(1) {
+        let last = out[out.len() - 1];
+        if p.distance(last) >= 2.0 {
+            out.push(p);
+        } else if k + 1 == run.len() && out.len() > 1 {
+            out.pop();
+            out.push(p);
+        }
+    }
+    out
 }

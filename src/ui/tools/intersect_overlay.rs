@@ -18,7 +18,7 @@ use crate::view::display::CurveRef;
 use crate::view::intersection::gap::LogScale;
 use crate::view::intersection::marks::{Drawing, legend};
 use crate::view::intersection::style::{Stroke, Style};
-use crate::view::intersection::{Class, Item, hatch};
+use crate::view::intersection::{Class, Item};
 use crate::view::scene::Scene;
 
 /// The number under which the tool's own things are kept on the graphics card.
@@ -41,12 +41,6 @@ impl IntersectSession {
             match &self.found {
                 None => self.sets(&mut d, scene, t),
                 Some(found) => {
-                    let overlap = Class::CoincidentBoundary.style(dark).rgb;
-                    let color = with_alpha(srgb(overlap), 0.8 * strength);
-                    let style = LineStyle { width: 1.2, color, dash: Dash::Solid, hidden: Hidden::Dashed };
-                    for k in 0..found.result.regions.len() {
-                        d.polylines(hatch::region(found, k), style);
-                    }
                     d.intersection(&Drawing::new(found, self.focus, dark), strength, dark);
                     if let Some(Ok(both)) = self.other.value() {
                         let color = with_alpha(linear(t.warn), strength);

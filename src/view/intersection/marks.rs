@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::hatch::region;
 use super::style::{Mark, Stroke, Style, junction};
 use super::{Class, Found, Item};
 use crate::kernel::ssi::result::CurveEnd;
@@ -39,6 +40,8 @@ pub struct Drawing {
     pub lines: Vec<DrawnLine>,
     /// Glyphs.
     pub glyphs: Vec<DrawnGlyph>,
+    /// The hatch lines of coincident regions, and their colour.
+    pub hatching: (Vec<Vec<DVec3>>, u32),
 }
 
 /// What is emphasised.
@@ -53,7 +56,9 @@ pub struct Focus {
 impl Drawing {
     /// What to draw of a result.
     pub fn new(found: &Found, focus: Focus, dark: bool) -> Self {
-        let mut drawing = Self::default();
+        let regions = 0..found.result.regions.len();
+        let hatching = (regions.flat_map(|k| region(found, k)).collect(), Class::CoincidentBoundary.style(dark).rgb);
+        let mut drawing = Self { hatching, ..Self::default() };
         for (k, place) in found.result.unresolved.iter().enumerate() {
             let item = Item::Unresolved(k);
             let style = focused(Class::Unresolved.style(dark), item, focus);
