@@ -4,7 +4,7 @@
 
 use glam::DVec2;
 
-use super::correct::{Condition, PointPair};
+use super::correct::{Condition, PointPair, correct};
 use super::derivative_bounds::DerivativeBounds;
 use super::engine::{Chain, Engine};
 use super::piece::{Patch, Piece};
@@ -16,6 +16,11 @@ use super::trace::{Mode, TraceNode, Tracer, along, hermite};
 const DEEPEST: usize = 6;
 /// Into how many parts at most, each time.
 const MOST_PARTS: f64 = 64.0;
+
+/// What rounding may leave of a parameter beyond a border.
+const BY_ROUNDING: f64 = 1e-13;
+/// How far along it a point may be moved onto a border that it is just beyond, in the unit frame.
+const NEAR_BORDER: f64 = 1e-5;
 
 /// The bounds of the derivatives of pieces, computed when they are first asked for.
 struct Bounds {
@@ -132,7 +137,22 @@ fn settled(engine: &Engine, node: &TraceNode) -> TraceNode {
     if at == node.at {
         return *node;
     }
-    let (a, b) = (engine.sides[0].pieces[node.pa].point(at.uv), engine.sides[1].pieces[node.pb].point(at.st));
+    let (a, b) = (&engine.sides[0].pieces[node.pa], &engine.sides[1].pieces[node.pb]);
+    let (from, to) = (node.at.to_array(), at.to_array());
+    let moved = |k: usize| (to[k] - from[k]).abs();
+    let farthest = (0..4).fold(0, |best, k| if moved(k) > moved(best) { k } else { best });
+    if node.sense != 0.0 && moved(farthest) > BY_ROUNDING {
+        // The tracer lets a curve lie beyond a border by a little: on the border instead, where it crosses that.
+        let on_border = Condition::Fixed(farthest, to[farthest]);
+        let inside = |x: PointPair| x.to_array().iter().all(|v| (-BY_ROUNDING..=1.0 + BY_ROUNDING).contains(v));
+        let found = correct(a, b, at, on_border, engine.trace.floor);
+        if let Some(c) = found.filter(|c| inside(c.at) && c.point().distance(node.p) < NEAR_BORDER) {
+            let mut x = c.at.to_array().map(|v| v.clamp(0.0, 1.0));
+            x[farthest] = to[farthest];
+            return TraceNode { at: PointPair::from_array(x), p: c.point(), off: 0.5 * c.residual, ..*node };
+        }
+    }
+    let (a, b) = (a.point(at.uv), b.point(at.st));
     TraceNode { at, p: 0.5 * (a + b), off: 0.5 * a.distance(b), ..*node }
 }
 

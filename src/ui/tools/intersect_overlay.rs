@@ -18,7 +18,7 @@ use crate::view::display::CurveRef;
 use crate::view::intersection::gap::LogScale;
 use crate::view::intersection::marks::{Drawing, legend};
 use crate::view::intersection::style::{Stroke, Style};
-use crate::view::intersection::{Class, Item};
+use crate::view::intersection::Item;
 use crate::view::scene::Scene;
 
 /// The number under which the tool's own things are kept on the graphics card.
