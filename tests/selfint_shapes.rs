@@ -8,7 +8,7 @@ mod shapes;
 
 use std::time::Instant;
 
-use glam::{DVec2, DVec3};
+use glam::{DAffine3, DQuat, DVec2, DVec3};
 use patchwright::kernel::geom::sweep::revolved;
 use patchwright::kernel::geom::{Direction, Knots, Surface};
 use patchwright::kernel::job::Job;
@@ -465,18 +465,33 @@ fn sheets_that_touch_along_a_curve_have_it_once_from_end_to_end() {
         ("along a parabola", 0.0, interpolate(&ku, &kv, bent)),
         ("aslant", 0.05, interpolate(&ku, &kv, |u, v| bent(u - 0.05 * v, v))),
     ] {
-        let found = solve(name, &surface);
-        let r = &found.result;
-        assert!(r.complete && r.junctions.is_empty() && r.miters.is_empty() && r.regions.is_empty(), "{name}");
-        assert_eq!(r.curves.len(), 1, "{name}");
-        let curve = &r.curves[0];
-        assert_eq!((curve.kind, curve.ends), (CurveKind::Tangential, [CurveEnd::Boundary; 2]), "{name}");
-        for p in &curve.points {
-            let [t, s] = [p.uv, p.st].map(|p| p.x - slope * p.y);
-            assert!((t.abs() - 1.0).abs() < 1e-5 && (t + s).abs() < 1e-5 && (p.uv.y - p.st.y).abs() < 1e-5, "{name}");
+        let moved = |scale: f64, by: f64| {
+            let to = DAffine3::from_scale_rotation_translation(DVec3::splat(scale), DQuat::IDENTITY, DVec3::splat(by));
+            surface.transformed(&to)
+        };
+        let split = surface.knot_inserted(Direction::U, -0.97, 1).unwrap();
+        let split = split.knot_inserted(Direction::V, 0.1, 1).unwrap();
+        for (how, surface) in [
+            ("as it is", surface.clone()),
+            ("small", moved(1e-3, 0.01)),
+            ("large and far", moved(1e3, 1e4)),
+            ("in patches", split),
+        ] {
+            let name = format!("{name}, {how}");
+            let found = solve(&name, &surface);
+            let r = &found.result;
+            assert!(r.complete && r.junctions.is_empty() && r.miters.is_empty() && r.regions.is_empty(), "{name}");
+            assert_eq!(r.curves.len(), 1, "{name}");
+            let curve = &r.curves[0];
+            assert_eq!((curve.kind, curve.ends), (CurveKind::Tangential, [CurveEnd::Boundary; 2]), "{name}");
+            for p in &curve.points {
+                let [t, s] = [p.uv, p.st].map(|p| p.x - slope * p.y);
+                let off = (t.abs() - 1.0).abs().max((t + s).abs()).max((p.uv.y - p.st.y).abs());
+                assert!(off < 1e-5, "{name}: {off}");
+            }
+            let ends = [curve.points[0], curve.points[curve.points.len() - 1]].map(|p| p.uv.y);
+            assert!((ends[0] + ends[1]).abs() < 1e-9 && (ends[0].abs() - 1.0).abs() < 1e-9, "{name}: {ends:?}");
         }
-        let ends = [curve.points[0], curve.points[curve.points.len() - 1]].map(|p| p.uv.y);
-        assert!((ends[0] + ends[1]).abs() < 1e-9 && (ends[0].abs() - 1.0).abs() < 1e-9, "{name}: {ends:?}");
     }
 }
 

@@ -15,10 +15,10 @@ use super::intersect::{Drawn, FieldKind, IntersectSession};
 use crate::kernel::ssi::result::Miter;
 use crate::render::{ColorScale, Dash, Field, GlyphData, GlyphShape, Hidden, LineStyle, Sketch, srgb, with_alpha};
 use crate::view::display::CurveRef;
+use crate::view::intersection::Item;
 use crate::view::intersection::gap::LogScale;
 use crate::view::intersection::marks::{Drawing, legend};
 use crate::view::intersection::style::{Stroke, Style};
-use crate::view::intersection::Item;
 use crate::view::scene::Scene;
 
 /// The number under which the tool's own things are kept on the graphics card.
