@@ -226,6 +226,19 @@ fn patches_that_touch_at_a_pole_and_along_it_are_neighbours_without_a_crossing()
 }
 
 #[test]
+fn fans_that_share_their_tip_only_touch_there() {
+    let fan = |turn: f64| {
+        let p = |x: f64, y: f64| DVec3::new(x, y, 0.0);
+        let flat = Surface::bilinear([p(0.0, 0.0), p(1.0, -0.3), p(0.0, 0.0), p(1.0, 0.3)]).unwrap();
+        flat.transformed(&(pose() * DAffine3::from_rotation_x(turn) * DAffine3::from_rotation_z(2.0 * turn)))
+    };
+    for turn in [0.7, 1.1, 1.5] {
+        let result = meet(&fan(0.0), &fan(turn));
+        assert!(result.complete && result.curves.is_empty(), "{turn}: {:?}", result.unresolved);
+    }
+}
+
+#[test]
 fn degenerate_borders_cost_neither_nodes_nor_entries_without_end() {
     // Such pairs once gave a million unresolved entries each.
     let [lens, wall] = airfoil();

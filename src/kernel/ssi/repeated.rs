@@ -3,7 +3,8 @@
 //!
 //! A chain is dropped when its nodes at [`PLACES`] along it lie on chains that are kept, by the test that seeds pass
 //! ([`super::trace::Tracer::passes`]); those that end well and are longest are kept. So are two curves side by side, however
-//! near: their points differ. A chain whose points are all one is no curve; it is dropped, too. Cost: one test for each
+//! near: their points differ. A chain whose points are all one is no curve; it is dropped, too, and with it what was left open
+//! where it lies on borders of both sides: they touch there, as patches of a model do in a pole. Cost: one test for each
 //! chain that is no repeat, against the steps of other chains on the same pieces.
 
 use std::collections::{HashMap, HashSet};
@@ -16,7 +17,13 @@ use super::trace::{TraceNode, Tracer};
 const PLACES: [f64; 9] = [0.5, 0.1, 0.2, 0.3, 0.4, 0.6, 0.7, 0.8, 0.9];
 /// A chain from border to border that is shorter than this, in the unit frame, is a point.
 const SHORTEST: f64 = 1e-9;
+/// What is nearer than this is one point, in the unit frame, as where pairs of nodes are divided no more.
+const SAME_POINT: f64 = 1e-8;
+/// How near a border counts as on it, in local parameters.
+const ON_BORDER: f64 = 1e-6;
 
+/// How near a kept chain the end of a dropped one may be, in the unit frame.
+const BESIDE: f64 = 1e-6;
 /// Why following a curve ends where another one goes on.
 const GIVEN_UP: [&str; 2] = ["the border of a patch is met at too shallow an angle", "the curve cannot be followed"];
 
@@ -28,6 +35,19 @@ fn is_point(chain: &Chain) -> bool {
     let loose = chain.ends.iter().all(|e| matches!(e.end, CurveEnd::Boundary | CurveEnd::Loop));
     let Some(first) = chain.nodes.first() else { return true };
     loose && chain.nodes.iter().all(|n| n.p.distance(first.p) < SHORTEST)
+}
+
+/// Whether a chain that could not be followed is a point in which borders of both sides touch, as at a pole: no crossing is
+/// there.
+fn is_touch(engine: &Engine, chain: &Chain) -> bool {
+    let on_border = |side: usize, n: &TraceNode| {
+        let (piece, at) = if side == 0 { (n.pa, n.at.uv) } else { (n.pb, n.at.st) };
+        engine.sides[side].borders_of(piece).iter().any(|e| (at[e.fixed] - e.value).abs() < ON_BORDER)
+    };
+    let Some(first) = chain.nodes.first() else { return true };
+    let open = chain.ends.iter().all(|e| matches!(e.end, CurveEnd::Boundary | CurveEnd::Unresolved));
+    let small = chain.nodes.iter().all(|n| n.p.distance(first.p) < SAME_POINT);
+    open && small && chain.nodes.iter().all(|n| on_border(0, n) && on_border(1, n))
 }
 
 /// The nodes at the places.
@@ -42,7 +62,7 @@ fn samples(chain: &Chain) -> Vec<&TraceNode> {
 
 /// Drops what is there twice, with what was left open where a dropped chain ends on a kept one.
 pub fn drop_repeats(engine: &mut Engine) {
-    if engine.chains.len() < 2 && !engine.chains.iter().any(is_point) {
+    if engine.chains.len() < 2 && !engine.chains.iter().any(|c| is_point(c) || is_touch(engine, c)) {
         return;
     }
     let mut order: Vec<(usize, f64, usize)> = Vec::with_capacity(engine.chains.len());
@@ -66,11 +86,25 @@ pub fn drop_repeats(engine: &mut Engine) {
                 })
             })
         };
+        // Next to a pole points differ by more than they should, where the borders are one in space.
+        let beside_kept = |node: &TraceNode| {
+            let own = steps.get(&(node.pa, node.pb)).into_iter().flatten();
+            own.map(|&(other, at)| &engine.chains[other].nodes[at..at + 2]).any(|w| {
+                let (from, along) = (w[0].p, w[1].p - w[0].p);
+                let f = ((node.p - from).dot(along) / along.length_squared().max(1e-300)).clamp(0.0, 1.0);
+                (from + along * f).distance(node.p) < BESIDE + engine.trace.tol
+            })
+        };
         let arm = chain.ends.iter().any(|e| e.end == CurveEnd::Junction);
+        if is_touch(engine, chain) {
+            explained.extend(chain.nodes.first().into_iter().chain(chain.nodes.last()));
+            dropped.insert(k);
+            continue;
+        }
         if is_point(chain) || (!arm && samples(chain).into_iter().all(&on_kept)) {
             let ends = [chain.nodes.first(), chain.nodes.last()];
             let open = ends.into_iter().zip(&chain.ends).filter(|(_, e)| e.end == CurveEnd::Unresolved);
-            explained.extend(open.filter_map(|(n, _)| n).filter(|n| on_kept(n)));
+            explained.extend(open.filter_map(|(n, _)| n).filter(|n| on_kept(n) || beside_kept(n)));
             dropped.insert(k);
             continue;
         }
