@@ -122,7 +122,9 @@ pub fn drop_repeats(engine: &mut Engine) {
     });
     for node in explained {
         let (a, b) = (&engine.sides[0].pieces[node.pa], &engine.sides[1].pieces[node.pb]);
-        let (uv, st) = (a.to_surface(node.at.uv), b.to_surface(node.at.st));
+        // Corrected points may be outside by rounding, the boxes of open places are not.
+        let inside = |at: glam::DVec2| at.clamp(glam::DVec2::ZERO, glam::DVec2::ONE);
+        let (uv, st) = (a.to_surface(inside(node.at.uv)), b.to_surface(inside(node.at.st)));
         let holds = |range: [[f64; 2]; 2], p: glam::DVec2| (0..2).all(|k| range[k][0] <= p[k] && p[k] <= range[k][1]);
         // Unless a kept chain ends there as well.
         let ends_here = |c: &Chain| {
