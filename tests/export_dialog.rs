@@ -10,7 +10,7 @@ use std::sync::Arc;
 use egui::{Event, Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use glam::DVec3;
-use patchwright::io::{self, SaveOptions};
+use patchwright::io::{self, ImportReport, SaveOptions, plot3d};
 use patchwright::kernel::geom::Surface;
 use patchwright::model::document::{Document, Shape, Unit};
 use patchwright::ui::Options;
@@ -80,4 +80,47 @@ fn what_is_offered_first_can_hold_the_model() {
         settle(&mut window);
         assert!(folder.path().join(path).exists(), "{name}: {path} was not written");
     }
+}
+
+/// Writes the visible surfaces as a Plot3D grid from the dialog, clustered at a side that is chosen there.
+#[test]
+fn grid_lines_gather_at_the_sides_chosen_in_the_dialog() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("roof.patchwright.ron");
+    io::save(&model, &roof(), &SaveOptions::default()).unwrap();
+    let mut window = window(builder(), Options { files: vec![model], ..Options::default() });
+    key(&mut window, Modifiers::COMMAND, Key::E);
+    for label in ["Plot3D", "Clustered (tanh)"] {
+        window.get_by_label(label).click();
+        settle(&mut window);
+    }
+    assert!(window.query_by_label("Sides that attract grid lines").is_some());
+    // The roof is the second of the two that are listed.
+    window.get_all_by_label("v max").nth(1).unwrap().click();
+    settle(&mut window);
+    picture(&mut window, "export_tanh");
+    let path = folder.path().join("roof.xyz");
+    window.get_by_label("Path").focus();
+    key(&mut window, Modifiers::COMMAND, Key::A);
+    window.event(Event::Text(path.display().to_string()));
+    window.step();
+    key(&mut window, Modifiers::NONE, Key::Enter);
+    assert!(path.exists(), "nothing was written");
+    let (layout, grids) = plot3d::read(&std::fs::read(&path).unwrap(), &mut ImportReport::default()).unwrap();
+    assert!(layout.multi_block && grids.len() == 2);
+    // Vinokur's tangent, with the stretching that the dialog begins with: the last cell is a thirtieth of the first.
+    let place = |clustered: bool, x: f64| if clustered { (2.5 * x).tanh() / 2.5_f64.tanh() } else { x };
+    for (grid, clustered) in grids.iter().zip([false, true]) {
+        assert_eq!(grid.counts(), [33, 33, 1]);
+        let at = |i: usize, j: usize| grid.points()[j * 33 + i];
+        for k in 0..32 {
+            let [from, to] = [k, k + 1].map(|k| place(clustered, k as f64 / 32.0));
+            // The edge between floor and roof is in the middle of its gap.
+            let tol = if k == 0 { 1.5e-3 } else { 1e-12 };
+            assert!((at(7, k).distance(at(7, k + 1)) - (to - from)).abs() < tol, "{clustered}, cell {k} along v");
+            assert!((at(k, 7).distance(at(k + 1, 7)) - 1.0 / 32.0).abs() < 1e-12, "{clustered}, cell {k} along u");
+        }
+    }
+    // The edge that both have is there once, point for point.
+    assert_eq!(grids[0].points()[32 * 33..], grids[1].points()[..33]);
 }

@@ -21,7 +21,9 @@ pub fn asset(name: &str) -> PathBuf {
 }
 
 pub fn builder() -> HarnessBuilder<App> {
-    Harness::builder().with_size([1400.0, 900.0]).with_max_steps(64)
+    let builder = Harness::builder().with_size([1400.0, 900.0]).with_max_steps(64);
+    // Only who wants pictures pays for drawing them.
+    if std::env::var_os("PATCHWRIGHT_PICTURES").is_some() { builder.wgpu() } else { builder }
 }
 
 pub fn window(builder: HarnessBuilder<App>, options: Options) -> Window {

@@ -338,11 +338,15 @@ impl Editor {
             for curve in &display.curves {
                 let n = curve.points.len();
                 let places = [n / 2, n / 3, 2 * n / 3, n / 4, 3 * n / 4, n / 8, 7 * n / 8];
+                let between = |k: usize| curve.points[k].midpoint(*curve.points.get(k + 1).unwrap_or(&curve.points[k]));
+                // Grid lines cross at their points: there a click may give either, between them it cannot.
+                let places: Vec<DVec3> =
+                    places.into_iter().filter(|&k| k < n).flat_map(|k| [curve.points[k], between(k)]).collect();
                 // Scripts click on whole pixels, so a place whose neighbours give the same curve comes first.
                 let around = [DVec2::ZERO, DVec2::X, DVec2::NEG_X, DVec2::Y, DVec2::NEG_Y];
                 let place = |offsets: &[DVec2]| {
-                    places.into_iter().filter(|&k| k < n).find_map(|k| {
-                        let pixel = view.project(curve.points[k])?.pixel;
+                    places.iter().find_map(|&p| {
+                        let pixel = view.project(p)?.pixel;
                         let gives = |off: &DVec2| {
                             let hit = self.viewport.pick_at(pixel + 0.5 * *off, filter);
                             hit.is_some_and(|h| matches!(h.target, Target::Curve { curve: c, .. } if c == curve.curve))

@@ -388,6 +388,8 @@ impl Editor {
             return;
         }
         if let Some((hit, held)) = pointer.click {
+            // Shift splits what is highlighted: a click that has just picked it there does not make it the next thing.
+            let hit = if held.shift { pointer.hover } else { hit };
             self.patch_event(Event::Click { hit, snap, held });
         }
     }

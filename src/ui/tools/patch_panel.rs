@@ -431,11 +431,12 @@ fn options(ui: &mut Ui, session: &PatchSession, visible: &[usize], surfaces: usi
         ui.end_row();
         label(ui, "Project on");
         let text = |onto: &Option<Vec<usize>>| match onto {
+            None if surfaces == 1 => "The only original".to_owned(),
             None => format!("All {surfaces} originals"),
             Some(list) => format!("{} of {surfaces} originals", list.len()),
         };
         let combo = egui::ComboBox::from_id_salt("onto").selected_text(text(&o.onto)).show_ui(ui, |ui| {
-            ui.selectable_value(&mut o.onto, None, format!("All {surfaces} originals"));
+            ui.selectable_value(&mut o.onto, None, text(&None));
             ui.selectable_value(&mut o.onto, Some(visible.to_vec()), format!("The {} visible now", visible.len()));
         });
         combo.response.accessible_name("Project on");

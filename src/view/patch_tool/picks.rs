@@ -145,7 +145,7 @@ impl PatchTool {
                     if self.add(side, a) {
                         let Stage::Side(side) = self.stage else { return };
                         self.sides[side].pieces.push(b);
-                        self.say("Split in two pieces; Backspace takes the second one back");
+                        self.say("Split in two pieces; Backspace frees the second one, for another side to take");
                     }
                 }
                 Err(_) => self.refuse("The split would leave a piece without length; click farther from the end"),
@@ -168,7 +168,10 @@ impl PatchTool {
                 pieces[index] = a;
                 // Last, so that Backspace takes it back.
                 pieces.push(b);
-                self.say(format!("Split in two pieces of side {}; Backspace takes the second one back", side + 1));
+                self.say(format!(
+                    "Split in two pieces of side {}; Backspace frees the second one, for another side to take",
+                    side + 1
+                ));
             }
             Err(_) => self.refuse("The split would leave a piece without length; click farther from the end"),
         }
@@ -213,9 +216,11 @@ impl PatchTool {
         }
         let [a, b] = piece.ends();
         if a.distance(b) <= self.options.joining_tol && self.notice.is_none() {
-            let text =
-                format!("Side {} closes on itself; Shift+click splits it, so that the loop has corners", target + 1);
-            self.say(text);
+            self.say(format!(
+                "Side {} closes on itself; Shift+click where a corner shall be splits it, and Backspace frees the rest \
+                 for the other sides",
+                target + 1
+            ));
         }
         self.touch(target);
         self.sides[target].pieces.push(piece);
