@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use egui::{Key, Modifiers};
 use glam::{DVec2, DVec3};
-use patchwright::kernel::geom::{Curve, Side};
+use patchwright::kernel::geom::{Curve, Knots, Side, Surface};
 use patchwright::kernel::mesh::facets::{FacetCurveKind, Facets};
 use patchwright::kernel::mesh::tri_mesh::TriMesh;
 use patchwright::model::document::{Document, Patch, Shape, Unit};
@@ -282,6 +282,52 @@ fn a_region_of_a_face_of_a_solid_block_is_healed_between_grid_lines() {
     let names = ["k max, i = 16", "k max, j = 4", "k max, i = 61", "k max, j = 19"];
     let flatness = 1.0 - 0.625_f64.to_radians().cos();
     between_lines(&mut window, names, "solid", flatness, |p| p.x.hypot(p.z) - 1.0);
+}
+
+/// A mesh and a spline surface of one cylinder with a gap between: two sides run over both, with a segment across the gap.
+#[test]
+fn a_gap_between_a_mesh_and_a_surface_is_healed() {
+    let f = |x: f64, _: f64| 0.4 * x * x;
+    let mut document = Document::new(Unit::Metre);
+    let knots = |a, b| Knots::bezier(2, a, b).unwrap();
+    let net = (0..9)
+        .map(|k| DVec3::new(0.5 * f64::from(k % 3), 1.2 + 0.5 * f64::from(k / 3), [0.0, 0.0, 0.4][k as usize % 3]));
+    let surface = Surface::new(knots(0.0, 1.0), knots(1.2, 2.2), net.collect(), None).unwrap();
+    document.add("surface", Shape::Surface(Arc::new(surface)), None);
+    document.add("mesh", Shape::Mesh(Arc::new(sheet([[0.0, 1.0], [0.0, 1.0]], [48, 48], f, |_, _| false))), None);
+    let mut window = opened("surfaces_with_gap.igs");
+    window.state_mut().editor.show_document(document, None, "both".to_owned(), true);
+    from_above(&mut window);
+    let border = |window: &Window, low, high| within(window, FacetCurveKind::Border, low, high)[0].0.clone();
+    let [near, left, right] =
+        [([0.0; 2], [1.0, 0.0]), ([0.0; 2], [0.0, 1.0]), ([1.0, 0.0], [1.0; 2])].map(|(a, b)| border(&window, a, b));
+    key(&mut window, NONE, Key::P);
+    pick(&mut window, "mesh", &near);
+    key(&mut window, NONE, Key::Enter);
+    for (x, mesh, surface) in [(0.0, left, "border u min"), (1.0, right, "border u max")] {
+        pick(&mut window, "mesh", &mesh);
+        key(&mut window, NONE, Key::L);
+        for y in [1.0, 1.2] {
+            let at = window.state().editor.viewport.project(DVec3::new(x, y, f(x, y))).unwrap();
+            click(&mut window, at);
+        }
+        pick(&mut window, "surface", surface);
+        key(&mut window, NONE, Key::Enter);
+    }
+    pick(&mut window, "surface", "border v max");
+    key(&mut window, NONE, Key::Enter);
+    let healed = heal(&mut window, "both");
+    // One of eight rows of spans is over the gap: its samples are made up, those at its ends stay on the segments.
+    let report = &healed.patch.report;
+    assert_eq!((report.projected, report.artificial, report.kept), (72, 7, 2), "{report:?}");
+    assert!(healed.measured > healed.vertices * 8 / 10 && healed.measured < healed.vertices, "{}", healed.measured);
+    let off = off_the_truth(&healed.patch, |p| p.z - f(p.x, p.y));
+    println!(
+        "gap: error {:.1e}, map {:.1e}, truth {off:.1e} of {:.1e}",
+        report.max_error, healed.deviation, healed.tol
+    );
+    assert!(healed.deviation <= healed.tol && off <= healed.tol);
+    accepted_and_undone(&mut window);
 }
 
 /// A round hole in a plane: its rim has no corners and is cut in four where one clicks with Shift.
