@@ -284,10 +284,10 @@ impl Tracer<'_> {
             let length = current.p.distance(next.p);
             bend = std::array::from_fn(|k| (next.rates[k] - current.rates[k]) / length);
             let (ends, beyond) = match self.inside(mode, [&current, &middle, &next]) {
-                Ok(ends) => ends,
-                Err(outside) => {
+                Some(ends) => ends,
+                None => {
                     // Along a border: change over to the piece beyond where it is.
-                    if let Some(k) = self.drifts(&current, &outside)
+                    if let Some(k) = self.drifts(&current, &next)
                         && let Some(beyond) = self.cross(mode, &current, k)
                         && hops < 12
                     {
@@ -298,7 +298,7 @@ impl Tracer<'_> {
                         continue;
                     }
                     // The border is met at a shallow angle: come closer first.
-                    h = 0.3 * current.p.distance(outside.p);
+                    h = 0.3 * current.p.distance(next.p);
                     if h < 1e-9 {
                         return (out, End::Unresolved("the border of a patch is met at too shallow an angle"));
                     }
@@ -450,24 +450,38 @@ impl Tracer<'_> {
     }
 
     /// The points of a step as far as it stays in the pair of pieces, the last on the border where it leaves it, and then
-    /// a point of it beyond. The error is that point, where the border cannot be met.
-    #[allow(clippy::result_large_err, reason = "both outcomes are nodes by value, of about the same size")]
-    fn inside(&self, mode: Mode, step: [&TraceNode; 3]) -> Result<(Vec<TraceNode>, Option<TraceNode>), TraceNode> {
+    /// a point of it beyond. `None` where it ends beyond a border that it cannot be seen to meet.
+    fn inside(&self, mode: Mode, step: [&TraceNode; 3]) -> Option<(Vec<TraceNode>, Option<TraceNode>)> {
+        let [from, middle, to] = step;
+        self.halves(mode, step).or_else(|| match self.exit(mode, from, to) {
+            Ok(None) => Some((vec![*middle, *to], None)),
+            Ok(Some(last)) => Some((vec![last], Some(*to))),
+            Err(()) => None,
+        })
+    }
+
+    /// The same, looking at both halves of the step.
+    fn halves(&self, mode: Mode, step: [&TraceNode; 3]) -> Option<(Vec<TraceNode>, Option<TraceNode>)> {
         let mut ends = Vec::with_capacity(2);
         for pair in step.windows(2) {
             let (from, mut to, mut left) = (pair[0], *pair[1], None);
             // Before the border where it was seen to leave it may have left and come back.
             for _ in 0..4 {
                 let Some(beyond) = self.outside(mode, from, &to) else { break };
-                let Some(last) = self.exit(mode, from, &beyond).map_err(|()| beyond)? else { break };
-                (to, left) = (last, Some(beyond));
+                let ends_outside = beyond.at == to.at;
+                match self.exit(mode, from, &beyond) {
+                    Ok(Some(last)) => (to, left) = (last, Some(beyond)),
+                    Err(()) if ends_outside => return None,
+                    // It only grazes the border, and ends on this side.
+                    Ok(None) | Err(()) => break,
+                }
             }
             ends.push(to);
             if left.is_some() {
-                return Ok((ends, left));
+                return Some((ends, left));
             }
         }
-        Ok((ends, None))
+        Some((ends, None))
     }
 
     /// A point of the arc between two points of a pair of pieces that lies outside of it: the second, or one where the
@@ -506,12 +520,16 @@ impl Tracer<'_> {
         })
     }
 
-    /// Where the step leaves the pair of pieces, if it does.
+    /// Where the step leaves the pair of pieces, if it does. From a border inwards it may come back to that border.
     fn exit(&self, mode: Mode, from: &TraceNode, to: &TraceNode) -> Result<Option<TraceNode>, ()> {
+        self.exit_by(mode, from, to, true).or_else(|()| self.exit_by(mode, from, to, false))
+    }
+
+    /// With `back`, not through the place on a border from which it heads inwards.
+    fn exit_by(&self, mode: Mode, from: &TraceNode, to: &TraceNode, back: bool) -> Result<Option<TraceNode>, ()> {
         let (x0, x1) = (from.at.to_array(), to.at.to_array());
-        // From a border inwards it may come back to that border.
         let fraction = |k: usize, bound: f64| {
-            let inwards = (x0[k] - bound).abs() <= SLACK && (bound - 0.5) * from.rates[k] < 0.0;
+            let inwards = back && (x0[k] - bound).abs() <= SLACK && (bound - 0.5) * from.rates[k] < 0.0;
             match inwards {
                 true => 1.0,
                 false if x1[k] == x0[k] => 0.0,
