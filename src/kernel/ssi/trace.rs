@@ -5,7 +5,8 @@
 //! measures what matters: turning angles alone lose branches that run close together. The sense of the curve is the
 //! sense of N_A x N_B, which cannot flip on a transversal curve, so that jumping onto a neighbouring branch of
 //! opposite sense is impossible and onto others is caught by the error. At the border of a piece the curve is
-//! corrected onto the border and goes on in the piece beyond, of the same surface or of a neighbour.
+//! corrected onto the border and goes on in the piece beyond, of the same surface or of a neighbour; the interpolant tells
+//! where it reaches over a border between two points.
 //!
 //! Cost: about three corrections a step, two kept as points. It fails honestly: [`End::Unresolved`] names the place.
 
