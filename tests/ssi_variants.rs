@@ -638,6 +638,20 @@ fn many_families_of_pairs_have_the_topology_of_their_oracles() {
     all(scale).done();
 }
 
+/// Where four patches of a surface meet, those across from each other have only the corner in common: it is part of the
+/// region in which the surface and its copy are one, and no curve starts there.
+#[test]
+fn a_surface_and_its_copy_are_one_region_and_nothing_else() {
+    // Those of which a corner was left open, and some more.
+    for seed in [20, 94, 188].into_iter().chain(1..6) {
+        let surface = graphs::spline_graph(3, seed, 0.0).unwrap();
+        let found = intersect(&[(0, &surface)], &[(1, &surface)], &SsiOptions::default(), &Job::new()).unwrap();
+        assert!(found.complete, "{seed}: {:?}", found.unresolved);
+        assert_eq!((found.regions.len(), found.curves.len(), found.junctions.len()), (1, 1, 0), "{seed}");
+        assert_eq!(found.curves[0].kind, CurveKind::CoincidentBoundary);
+    }
+}
+
 /// A traced point may lie beyond a border by a little; what is given lies on both surfaces.
 #[test]
 fn points_beside_a_border_lie_on_both_surfaces() {

@@ -26,7 +26,7 @@ use super::piece::Patch;
 use super::region::{self, CoincidentRegion};
 use super::repeated;
 use super::result::{Counts, CurveEnd, Intersection, Times, Unresolved};
-use super::side::{Frame, Side};
+use super::side::{Frame, Side, closest_from};
 use super::tangency::from_tori;
 use super::trace::{Disc, End, Mode, TraceNode, TraceOptions, Tracer};
 use super::traverse::{ArcPair, OpenPair, TOO_SMALL, Traversal, traverse};
@@ -179,6 +179,9 @@ pub fn intersect(
     Ok(result)
 }
 
+/// A point on the border of a cell belongs to it, to within this.
+const CELL_BORDER: f64 = 1e-6;
+
 /// How near a seed on a border must be to a curve on it to be one with it, in the unit frame.
 const SAME_ON_BORDER: f64 = 5e-7;
 
@@ -243,7 +246,7 @@ impl Engine {
         let total = (traversal.arcs.len() + traversal.findings.seeds.len()).max(1) as f64;
         for (k, seed) in traversal.findings.seeds.iter().enumerate() {
             go_on()?;
-            self.trace_contact_seed(seed);
+            self.trace_contact_seed(seed, &coincident);
             job.progress(0.5 + 0.5 * k as f64 / total);
         }
         for (k, arc) in traversal.arcs.iter().enumerate() {
@@ -549,7 +552,8 @@ impl Engine {
         node.at.to_array().iter().all(|v| (-SLACK..=1.0 + SLACK).contains(v))
     }
 
-    fn trace_contact_seed(&mut self, seed: &Seed) {
+    /// `coincident` is where the surfaces are one: no curve starts from there.
+    fn trace_contact_seed(&mut self, seed: &Seed, coincident: &[Cell]) {
         let pair = [seed.pa, seed.pb];
         let ja = self.sides[0].pieces[seed.pa].jet1(seed.at.uv);
         let jb = self.sides[1].pieces[seed.pb].jet1(seed.at.st);
@@ -567,11 +571,24 @@ impl Engine {
             Some(_) => {}
             None => {
                 let near = |c: &Contacted| c.binormal.p.distance(ja.p) < c.radius.max(1e-6);
-                if !self.contacts.iter().any(near) {
+                if !self.contacts.iter().any(near) && !self.lies_in(coincident, ja.p) {
                     self.give_up(pair, seed.at, "a point of a curve could not be corrected");
                 }
             }
         }
+    }
+
+    /// Whether a point of A lies in a cell.
+    fn lies_in(&self, cells: &[Cell], p: DVec3) -> bool {
+        let near = 4.0 * self.gap + 1e-13;
+        cells.iter().any(|c| {
+            if !self.sides[0].bounds[c.pa].grown(near).contains(p) {
+                return false;
+            }
+            let (uv, distance) = closest_from(&self.sides[0].pieces[c.pa], p, c.middle.uv);
+            let within = uv.cmpge(c.low - CELL_BORDER).all() && uv.cmple(c.high + CELL_BORDER).all();
+            distance <= near && within
+        })
     }
 
     fn trace_ridge(&mut self, seed: &Seed) {
