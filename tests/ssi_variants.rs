@@ -652,6 +652,27 @@ fn a_surface_and_its_copy_are_one_region_and_nothing_else() {
     }
 }
 
+/// Parts of a surface whose borders lie just beyond knot lines have narrow patches, which borders of the other part cross.
+#[test]
+fn overlapping_parts_with_narrow_patches_are_one_region() {
+    for (seed, beyond) in [(8, 2e-3), (105, 1e-2), (8, 1e-1)] {
+        let whole = graphs::spline_graph(3, seed, 0.0).unwrap();
+        let lower = whole.restricted([0.0, 3.0], [0.0, 2.0 + beyond]).unwrap();
+        let right = whole.restricted([1.0 - 6.0 * beyond, 3.0], [0.0, 3.0]).unwrap();
+        let found = intersect(&[(0, &lower)], &[(1, &right)], &SsiOptions::default(), &Job::new()).unwrap();
+        assert!(found.complete, "{seed}: {:?}", found.unresolved.first());
+        assert_eq!((found.regions.len(), found.curves.len()), (1, 1), "{seed}");
+        // The rectangle that both cover, all of its border.
+        let loops = &found.regions[0].boundary;
+        let (low, high) = loops
+            .iter()
+            .flatten()
+            .fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p.uv), high.max(p.uv)));
+        let expected = [DVec2::new(1.0 - 6.0 * beyond, 0.0), DVec2::new(3.0, 2.0 + beyond)];
+        assert!(low.distance(expected[0]) < 1e-6 && high.distance(expected[1]) < 1e-6, "{low} {high}");
+    }
+}
+
 /// A traced point may lie beyond a border by a little; what is given lies on both surfaces.
 #[test]
 fn points_beside_a_border_lie_on_both_surfaces() {

@@ -43,6 +43,10 @@ pub struct RegionPoint {
 const SAMPLES: usize = 48;
 /// Where a border between two pieces of a surface is looked at first; the middle comes first.
 const PROBES: [f64; 5] = [0.5, 0.0, 0.25, 0.75, 1.0];
+/// Samples over the width of the other piece.
+const NARROW: f64 = 3.0;
+/// The most samples of one border: across what is narrower than a 3000th of it, the region does not close and is left open.
+const MOST_SAMPLES: f64 = 10_000.0;
 /// Ends of intervals closer than this are one.
 const JOINED: f64 = 1e-6;
 
@@ -146,6 +150,9 @@ impl Finder<'_> {
         let mut place = |t: f64| -> Option<RegionPoint> {
             let own = Place { piece: pair[side], uv: uv_at(t) };
             let p = piece.point(own.uv);
+            if !self.engine.sides[other].bounds[pair[other]].grown(self.near).contains(p) {
+                return None;
+            }
             let there = self.onto_from(other, pair[other], p, guess)?;
             guess = Some(there.uv);
             Some(if side == 0 { RegionPoint { a: own, b: there, p } } else { RegionPoint { a: there, b: own, p } })
@@ -178,11 +185,16 @@ impl Finder<'_> {
             }
             best
         }
-        // As many samples as the tolerance of the polyline asks for.
+        // As many samples as the tolerance of the polyline asks for, and some on a narrow piece that the border crosses.
         let coarse: Vec<DVec3> = (0..=SAMPLES).map(|k| piece.point(uv_at(k as f64 / SAMPLES as f64))).collect();
         let sag = coarse.windows(3).map(|w| 0.25 * (w[1] - 0.5 * (w[0] + w[2])).length()).fold(0.0, f64::max);
         let finer = ((1.5 * sag / self.engine.trace.tol).sqrt().ceil() as usize).clamp(1, 64);
-        let samples = SAMPLES * finer;
+        let length: f64 = coarse.windows(2).map(|w| w[0].distance(w[1])).sum();
+        let on_other = |u: f64, v: f64| self.engine.sides[other].pieces[pair[other]].point(DVec2::new(u, v));
+        let width =
+            on_other(0.0, 0.5).distance(on_other(1.0, 0.5)).min(on_other(0.5, 0.0).distance(on_other(0.5, 1.0)));
+        let narrow = (length / width * NARROW).ceil().min(MOST_SAMPLES) as usize;
+        let samples = (SAMPLES * finer).max(narrow);
         for k in 0..=samples {
             let t = k as f64 / samples as f64;
             let here = place(t);
