@@ -29,13 +29,19 @@ fn roof() -> Document {
     document
 }
 
-#[test]
-fn the_dialog_tells_gap_and_angle_and_writes_what_it_told() {
+/// The export dialog over the roof, which was read from a file in the folder.
+fn dialog_of_the_roof() -> (tempfile::TempDir, Window) {
     let folder = tempfile::tempdir().unwrap();
     let model = folder.path().join("roof.patchwright.ron");
     io::save(&model, &roof(), &SaveOptions::default()).unwrap();
     let mut window = window(builder(), Options { files: vec![model], ..Options::default() });
     key(&mut window, Modifiers::COMMAND, Key::E);
+    (folder, window)
+}
+
+#[test]
+fn the_dialog_tells_gap_and_angle_and_writes_what_it_told() {
+    let (folder, mut window) = dialog_of_the_roof();
     for text in ["Largest edge gap", "0.00150 mm", "Largest normal angle", "30.000°"] {
         assert!(window.query_by_label_contains(text).is_some(), "{text} is not said");
     }
@@ -85,11 +91,7 @@ fn what_is_offered_first_can_hold_the_model() {
 /// Writes the visible surfaces as a Plot3D grid from the dialog, clustered at a side that is chosen there.
 #[test]
 fn grid_lines_gather_at_the_sides_chosen_in_the_dialog() {
-    let folder = tempfile::tempdir().unwrap();
-    let model = folder.path().join("roof.patchwright.ron");
-    io::save(&model, &roof(), &SaveOptions::default()).unwrap();
-    let mut window = window(builder(), Options { files: vec![model], ..Options::default() });
-    key(&mut window, Modifiers::COMMAND, Key::E);
+    let (folder, mut window) = dialog_of_the_roof();
     for label in ["Plot3D", "Clustered (tanh)"] {
         window.get_by_label(label).click();
         settle(&mut window);

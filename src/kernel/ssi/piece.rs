@@ -108,7 +108,7 @@ impl Piece {
         self.jet1(uv).p
     }
 
-    /// The points over a grid, first parameter fastest. Cost: 5 ns a point of a large grid at degree 3.
+    /// The points over a grid, first parameter fastest. Cost: a fraction of that of single points, row sums being shared.
     pub fn grid(&self, us: &[f64], vs: &[f64]) -> Vec<DVec3> {
         match self.degree[0].max(self.degree[1]) {
             0..=3 => self.grid_of::<4>(us, vs),
@@ -121,11 +121,13 @@ impl Piece {
         let [p, q] = self.degree;
         let mut out = vec![DVec3::ZERO; us.len() * vs.len()];
         // Bit for bit what single points are, so that equal points of equal surfaces have no gap.
+        let is_bicubic = self.bicubic().is_some();
         let values = |degree: usize, t: f64| -> [f64; K] {
-            match self.bicubic() {
-                Some(_) => std::array::from_fn(|k| cubic::<1>(t)[0][k.min(3)]),
-                None => bernstein::<K, 1>(degree, t)[0],
+            if !is_bicubic {
+                return bernstein::<K, 1>(degree, t)[0];
             }
+            let [four] = cubic::<1>(t);
+            std::array::from_fn(|k| four[k.min(3)])
         };
         let across: Vec<[f64; K]> = vs.iter().map(|&v| values(q, v)).collect();
         for (i, &u) in us.iter().enumerate() {
@@ -226,8 +228,8 @@ impl Patch for Piece {
     }
 }
 
-/// The sums of a bicubic net. Lengths that the compiler knows and plain arrays of four, which it turns into vector
-/// instructions, halve the time.
+/// The sums of a bicubic net, with lengths that the compiler knows and in plain arrays of four, which it turns into
+/// vector instructions.
 #[inline(always)]
 fn bicubic<const D: usize>(net: &[DVec4; 16], bu: [[f64; 4]; D], bv: [[f64; 4]; D]) -> [[DVec4; D]; D] {
     let mut out = [[[0.0; 4]; D]; D];

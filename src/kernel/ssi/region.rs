@@ -56,7 +56,8 @@ struct Finder<'a> {
     pieces: [Boxes; 2],
 }
 
-/// Finds all regions from cells in which the gap vanishes. Pieces without such cells take no part. None when cancelled.
+/// Finds all regions from cells in which the gap vanishes. Pieces without such cells take no part. Empty when
+/// cancelled.
 pub fn regions(engine: &Engine, cells: &[Cell], job: &Job) -> Vec<CoincidentRegion> {
     if cells.is_empty() {
         return Vec::new();
