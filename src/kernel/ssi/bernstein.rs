@@ -75,50 +75,59 @@ fn matrix(n: usize) -> &'static [f64] {
 
 /// The Bernstein polynomials of degree `n <= MAX_FIT`; the entries beyond are zero.
 fn basis(n: usize, t: f64) -> [f64; MAX_FIT + 1] {
-    let mut b = [0.0; MAX_FIT + 1];
-    b[0] = 1.0;
-    for degree in 0..n {
-        let mut carry = 0.0;
-        for value in b.iter_mut().take(degree + 2) {
-            let old = *value;
-            *value = old * (1.0 - t) + carry;
-            carry = old * t;
-        }
-    }
-    b
+    basis_of(n.min(MAX_FIT), [&powers(t), &powers(1.0 - t)])
 }
 
-/// The Bernstein polynomials of degree `2 <= n <= MAX_FIT` with their first and second derivatives, in one recurrence.
-fn basis_with_derivatives(n: usize, t: f64) -> [[f64; MAX_FIT + 1]; 3] {
-    let raised = |b: &[f64; MAX_FIT + 1], degree: usize| {
-        let mut out = [0.0; MAX_FIT + 1];
-        let mut carry = 0.0;
-        for (out, old) in out.iter_mut().zip(b).take(degree + 2) {
-            *out = old * (1.0 - t) + carry;
-            carry = old * t;
+/// The powers 0, 1, 2.. of a number.
+#[inline(always)]
+fn powers<const W: usize>(t: f64) -> [f64; W] {
+    let mut out = [1.0; W];
+    for k in 1..W {
+        out[k] = out[k - 1] * t;
+    }
+    out
+}
+
+/// The Bernstein polynomials of degree `n < W` from the powers of t and 1 - t; the entries beyond are zero.
+#[inline(always)]
+fn basis_of<const W: usize>(n: usize, [t, s]: [&[f64; W]; 2]) -> [f64; W] {
+    std::array::from_fn(|k| if k <= n { BINOMIALS[n][k] * t[k] * s[n - k] } else { 0.0 })
+}
+
+/// The binomial coefficients n over k.
+const BINOMIALS: [[f64; MAX_FIT + 1]; MAX_FIT + 1] = {
+    let mut out = [[0.0; MAX_FIT + 1]; MAX_FIT + 1];
+    let mut n = 0;
+    while n <= MAX_FIT {
+        out[n][0] = 1.0;
+        let mut k = 1;
+        while k <= n {
+            out[n][k] = out[n - 1][k - 1] + out[n - 1][k];
+            k += 1;
         }
-        out
-    };
-    let low2 = basis(n - 2, t);
-    let low1 = raised(&low2, n - 2);
-    let all = raised(&low1, n - 1);
-    let (mut b1, mut b2) = ([0.0; MAX_FIT + 1], [0.0; MAX_FIT + 1]);
+        n += 1;
+    }
+    out
+};
+
+/// The Bernstein polynomials of degree `W - 1 >= 2` with their first and second derivatives.
+#[inline(always)]
+fn basis_with_derivatives<const W: usize>(t: f64) -> [[f64; W]; 3] {
+    let n = W - 1;
+    let (t, s) = (powers(t), powers(1.0 - t));
+    let [all, low1, low2] = [0, 1, 2].map(|less| basis_of(n - less, [&t, &s]));
     let (f1, f2) = (n as f64, (n * (n - 1)) as f64);
-    for i in 0..=n {
-        let at = |b: &[f64; MAX_FIT + 1], back: usize| if i >= back { b[i - back] } else { 0.0 };
-        b1[i] = f1 * (at(&low1, 1) - low1[i]);
-        b2[i] = f2 * (at(&low2, 2) - 2.0 * at(&low2, 1) + low2[i]);
-    }
-    [all, b1, b2]
+    let at = |b: &[f64; W], i: usize, back: usize| if i >= back { b[i - back] } else { 0.0 };
+    let first = std::array::from_fn(|i| f1 * (at(&low1, i, 1) - low1[i]));
+    let second = std::array::from_fn(|i| f2 * (at(&low2, i, 2) - 2.0 * at(&low2, i, 1) + low2[i]));
+    [all, first, second]
 }
 
-/// A polynomial of degree `n` in both variables over [0, 1]^2.
-#[derive(Clone, Debug)]
-pub struct Poly2 {
-    /// The degree in each variable.
-    pub n: usize,
+/// A polynomial of degree `W - 1 <= MAX_FIT` in both variables over [0, 1]^2.
+#[derive(Clone, Copy, Debug)]
+pub struct Poly2<const W: usize> {
     /// The coefficients, first variable fastest.
-    pub c: Vec<f64>,
+    pub c: [[f64; W]; W],
 }
 
 /// The value with first and second derivatives.
@@ -132,92 +141,102 @@ pub struct Value2 {
     pub h: [f64; 3],
 }
 
-impl Poly2 {
-    /// The interpolant of values at the nodes.
-    pub fn fit(n: usize, values: &[f64]) -> Self {
-        Self { n, c: to_bernstein([n, n], values) }
+impl<const W: usize> Poly2<W> {
+    /// The interpolant of values at the tensor Chebyshev nodes, first variable fastest.
+    pub fn fit(values: &[[f64; W]; W]) -> Self {
+        let m = matrix(W - 1);
+        let columns: [[f64; W]; W] = std::array::from_fn(|i| std::array::from_fn(|j| m[j * W + i]));
+        let mut half = [[0.0; W]; W];
+        for (out, row) in half.iter_mut().zip(m.chunks_exact(W)) {
+            for (line, m) in values.iter().zip(row) {
+                (0..W).for_each(|i| out[i] += m * line[i]);
+            }
+        }
+        let mut c = [[0.0; W]; W];
+        for (out, line) in c.iter_mut().zip(&half) {
+            for (column, v) in columns.iter().zip(line) {
+                (0..W).for_each(|i| out[i] += v * column[i]);
+            }
+        }
+        Self { c }
     }
 
     /// The value alone.
     pub fn value(&self, x: f64, y: f64) -> f64 {
-        let n = self.n;
-        let (bx, by) = (basis(n, x), basis(n, y));
-        let along = |row: &[f64]| row.iter().zip(&bx).map(|(c, b)| c * b).sum::<f64>();
-        self.c.chunks_exact(n + 1).zip(&by).map(|(row, b)| along(row) * b).sum()
+        let at = |t: f64| -> [f64; W] { basis_of(W - 1, [&powers(t), &powers(1.0 - t)]) };
+        let (bx, by) = (at(x), at(y));
+        let mut along = [0.0; W];
+        for (row, b) in self.c.iter().zip(by) {
+            (0..W).for_each(|i| along[i] += row[i] * b);
+        }
+        (0..W).map(|i| along[i] * bx[i]).sum()
     }
 
     /// The value and derivatives; the degree is at least 2.
     pub fn eval(&self, x: f64, y: f64) -> Value2 {
-        let (bx, by) = (basis_with_derivatives(self.n, x), basis_with_derivatives(self.n, y));
-        let mut out = Value2::default();
-        for (j, row) in self.c.chunks_exact(self.n + 1).enumerate() {
-            let (mut f, mut d, mut h) = (0.0, 0.0, 0.0);
-            for ((c, b0), (b1, b2)) in row.iter().zip(&bx[0]).zip(bx[1].iter().zip(&bx[2])) {
-                f += c * b0;
-                d += c * b1;
-                h += c * b2;
+        let (bx, by) = (basis_with_derivatives::<W>(x), basis_with_derivatives::<W>(y));
+        let mut along = [[0.0; W]; 3];
+        for (j, row) in self.c.iter().enumerate() {
+            for (order, along) in along.iter_mut().enumerate() {
+                (0..W).for_each(|i| along[i] += row[i] * by[order][j]);
             }
-            out.f += f * by[0][j];
-            out.d[0] += d * by[0][j];
-            out.d[1] += f * by[1][j];
-            out.h[0] += h * by[0][j];
-            out.h[1] += d * by[1][j];
-            out.h[2] += f * by[2][j];
         }
-        out
+        let sum = |by_x: usize, by_y: usize| (0..W).map(|i| along[by_y][i] * bx[by_x][i]).sum();
+        Value2 { f: sum(0, 0), d: [sum(1, 0), sum(0, 1)], h: [sum(2, 0), sum(1, 1), sum(0, 2)] }
     }
 
     /// The two halves along the first (0) or second (1) variable, each over its own [0, 1]^2.
     pub fn split(&self, along: usize) -> [Self; 2] {
-        let n = self.n;
-        let (mut first, mut second) = (self.c.clone(), self.c.clone());
-        let (stride, step) = if along == 0 { (1, n + 1) } else { (n + 1, 1) };
-        for line in 0..=n {
-            let at = |i: usize| line * step + i * stride;
-            for level in 1..=n {
-                for i in 0..=n - level {
-                    second[at(i)] = 0.5 * (second[at(i)] + second[at(i + 1)]);
+        let (mut first, mut second) = (*self, *self);
+        if along == 0 {
+            for (first, second) in first.c.iter_mut().zip(&mut second.c) {
+                for level in 1..W {
+                    for i in 0..W - level {
+                        second[i] = 0.5 * (second[i] + second[i + 1]);
+                    }
+                    first[level] = second[0];
                 }
-                first[at(level)] = second[at(0)];
+            }
+        } else {
+            for level in 1..W {
+                for j in 0..W - level {
+                    for i in 0..W {
+                        second.c[j][i] = 0.5 * (second.c[j][i] + second.c[j + 1][i]);
+                    }
+                }
+                first.c[level] = second.c[0];
             }
         }
-        [Self { n, c: first }, Self { n, c: second }]
+        [first, second]
     }
 
     /// The range of the coefficients.
     pub fn range(&self) -> [f64; 2] {
-        range(self.c.iter().copied())
+        range(self.c.as_flattened().iter().copied())
     }
 
     /// Ranges of the coefficients of both first derivatives.
     pub fn gradient_range(&self) -> [[f64; 2]; 2] {
-        let (n, w) = (self.n, self.n + 1);
-        let f = n as f64;
-        let x = (0..w).flat_map(|j| (0..n).map(move |i| (j * w + i, j * w + i + 1)));
-        let y = (0..n).flat_map(|j| (0..w).map(move |i| (j * w + i, (j + 1) * w + i)));
-        [range(x.map(|(a, b)| (self.c[b] - self.c[a]) * f)), range(y.map(|(a, b)| (self.c[b] - self.c[a]) * f))]
+        let f = (W - 1) as f64;
+        let x = self.c.iter().flat_map(|row| row.windows(2).map(|w| w[1] - w[0]));
+        let y = self.c.windows(2).flat_map(|w| (0..W).map(move |i| w[1][i] - w[0][i]));
+        [range(x).map(|v| v * f), range(y).map(|v| v * f)]
     }
 
     /// Ranges of the coefficients of the second derivatives xx, xy, yy.
     pub fn hessian_range(&self) -> [[f64; 2]; 3] {
-        let (n, w) = (self.n, self.n + 1);
-        let c = |i: usize, j: usize| self.c[j * w + i];
+        let n = W - 1;
         let (f2, f11) = ((n * (n - 1)) as f64, (n * n) as f64);
-        let xx = (0..w).flat_map(|j| (0..n - 1).map(move |i| (i, j)));
-        let yy = (0..n - 1).flat_map(|j| (0..w).map(move |i| (i, j)));
-        let xy = (0..n).flat_map(|j| (0..n).map(move |i| (i, j)));
-        [
-            range(xx.map(|(i, j)| (c(i + 2, j) - 2.0 * c(i + 1, j) + c(i, j)) * f2)),
-            range(xy.map(|(i, j)| (c(i + 1, j + 1) - c(i + 1, j) - c(i, j + 1) + c(i, j)) * f11)),
-            range(yy.map(|(i, j)| (c(i, j + 2) - 2.0 * c(i, j + 1) + c(i, j)) * f2)),
-        ]
+        let xx = self.c.iter().flat_map(|row| row.windows(3).map(|w| w[2] - 2.0 * w[1] + w[0]));
+        let yy = self.c.windows(3).flat_map(|w| (0..W).map(move |i| w[2][i] - 2.0 * w[1][i] + w[0][i]));
+        let xy = self.c.windows(2).flat_map(|w| (0..n).map(move |i| w[1][i + 1] - w[0][i + 1] - w[1][i] + w[0][i]));
+        [range(xx).map(|v| v * f2), range(xy).map(|v| v * f11), range(yy).map(|v| v * f2)]
     }
 
     /// The coefficients along one of the four edges: `fixed` variable (0 or 1) at 0 or 1.
-    pub fn edge(&self, fixed: usize, at_end: bool) -> Vec<f64> {
-        let (n, w) = (self.n, self.n + 1);
-        let k = if at_end { n } else { 0 };
-        (0..=n).map(|i| if fixed == 0 { self.c[i * w + k] } else { self.c[k * w + i] }).collect()
+    pub fn edge(&self, fixed: usize, at_end: bool) -> [f64; W] {
+        let k = if at_end { W - 1 } else { 0 };
+        if fixed == 0 { self.c.map(|row| row[k]) } else { self.c[k] }
     }
 }
 
@@ -229,9 +248,14 @@ fn range(values: impl Iterator<Item = f64>) -> [f64; 2] {
 /// Sign variations of the coefficients separate the roots; a cluster that no subdivision separates gives one place.
 pub fn roots(coefficients: &[f64], noise: f64) -> Vec<f64> {
     let mut out = Vec::new();
+    // Most have none.
+    let [min, max] = range(coefficients.iter().copied());
+    if min > noise || max < -noise {
+        return out;
+    }
     let mut stack = vec![(coefficients.to_vec(), 0.0, 1.0)];
     while let Some((c, low, high)) = stack.pop() {
-        let (min, max) = c.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), &v| (a.min(v), b.max(v)));
+        let [min, max] = range(c.iter().copied());
         if min > noise || max < -noise {
             continue;
         }
@@ -308,16 +332,16 @@ mod tests {
     #[test]
     fn fits_reproduce_polynomials() {
         let f = |x: f64, y: f64| 1.0 + x - 3.0 * x * y * y + x.powi(5) * y.powi(7);
-        let n = 8;
-        let values: Vec<f64> =
-            (0..=n).flat_map(|j| (0..=n).map(move |i| f(chebyshev_node(n, i), chebyshev_node(n, j)))).collect();
-        let p = Poly2::fit(n, &values);
+        let at = |i: usize| chebyshev_node(8, i);
+        let p: Poly2<9> = Poly2::fit(&std::array::from_fn(|j| std::array::from_fn(|i| f(at(i), at(j)))));
         for (x, y) in [(0.1, 0.9), (0.5, 0.25), (1.0, 0.0)] {
             let v = p.eval(x, y);
             assert!((v.f - f(x, y)).abs() < 1e-13);
             assert!((v.d[0] - (1.0 - 3.0 * y * y + 5.0 * x.powi(4) * y.powi(7))).abs() < 1e-11);
             assert!((v.h[1] - (-6.0 * y + 35.0 * x.powi(4) * y.powi(6))).abs() < 1e-9);
         }
+        let [left, _] = p.split(0);
+        assert!((left.value(0.3, 0.5) - f(0.15, 0.5)).abs() < 1e-13);
         let [low, high] = p.split(1);
         assert!((low.eval(0.3, 0.5).f - f(0.3, 0.25)).abs() < 1e-13);
         assert!((high.eval(0.3, 0.5).f - f(0.3, 0.75)).abs() < 1e-13);

@@ -23,6 +23,10 @@ use super::tree::Node;
 
 /// The degree of the fit in each variable.
 const DEGREE: usize = 8;
+/// How many nodes that takes.
+const W: usize = DEGREE + 1;
+/// A fitted function.
+type Fit = Poly2<W>;
 /// How far the last coefficient along a line may exceed the error allowed (that of the cell may be larger).
 const ROUGH: f64 = 30.0;
 /// Rounding of g in the unit frame.
@@ -47,9 +51,9 @@ pub struct Contact {
     pub low: DVec2,
     /// Where it ends.
     pub high: DVec2,
-    g: Poly2,
-    s: Poly2,
-    t: Poly2,
+    g: Fit,
+    s: Fit,
+    t: Fit,
     /// A bound of the error of `g`.
     error: f64,
     /// The rectangle on B in which all feet lie.
@@ -132,7 +136,7 @@ pub fn foot_along(
         let step = DVec2::new((m[3] * r.x - m[1] * r.y) / det, (m[0] * r.y - m[2] * r.x) / det);
         let length = step.length();
         // A last small step is as good as linear: its square is below rounding.
-        if length < 1e-8 {
+        if length < 3e-8 {
             let p = jet.p - jet.u * step.x - jet.v * step.y;
             return Some((st - step, super::piece::Jet1 { p, ..jet }));
         }
@@ -169,44 +173,38 @@ pub fn fit(a: &Piece, node: &Node, b: &Piece, other: &Node) -> Option<Contact> {
         }
         Some(((p - jb.p).dot(n), st))
     };
-    let nodes: [f64; DEGREE + 1] = std::array::from_fn(|i| chebyshev_node(DEGREE, i));
+    let nodes: [f64; W] = std::array::from_fn(|i| chebyshev_node(DEGREE, i));
     let along = |k: usize| nodes.map(|x| node.low[k] + (node.high[k] - node.low[k]) * x);
     let points = a.grid(&along(0), &along(1));
-    const W: usize = DEGREE + 1;
     let sample = |i: usize, j: usize, start: DVec2| foot(points[j * W + i], start);
     // The foot of the middle, then outwards from there, each predicted from those that are known.
     let (_, center) = sample(DEGREE / 2, DEGREE / 2, other.local(DVec2::ZERO))?;
     const M: usize = DEGREE / 2;
-    let mut g = vec![0.0; W * W];
+    let mut g = [[0.0; W]; W];
     let mut feet = [[DVec2::ZERO; W]; W];
     // The middle column and the middle row first: where they need a higher degree, so does the rest.
-    for j in (0..=M).rev().chain(M + 1..W) {
-        let start = match j.abs_diff(M) {
-            0 => center,
-            1 if j < M => feet[M][M],
-            _ => extrapolated(j, |j| feet[j][M]),
-        };
-        (g[j * W + M], feet[j][M]) = sample(M, j, start)?;
+    for j in outwards() {
+        let start = if j == M { center } else { extrapolated(j, |j| feet[j][M]) };
+        (g[j][M], feet[j][M]) = sample(M, j, start)?;
     }
-    if rough(|j| g[j * W + M]) {
+    if rough(|j| g[j][M]) {
         return None;
     }
-    for j in [M].into_iter().chain((0..M).rev()).chain(M + 1..W) {
-        let inner_row = if j > M { j - 1 } else { j + 1 };
-        for i in (0..M).rev().chain(M + 1..W) {
-            let start = if i > M || i + 2 < M {
-                extrapolated(i, |i| feet[j][i])
-            } else {
-                let step = if j == M { DVec2::ZERO } else { feet[inner_row][i] - feet[inner_row][i + 1] };
-                feet[j][i + 1] + step
-            };
-            (g[j * W + i], feet[j][i]) = sample(i, j, start)?;
+    // How far feet extrapolated along their row were off: extrapolated across the rows that corrects the next, so
+    // that one evaluation is enough for most.
+    let mut missed = [[DVec2::ZERO; W]; W];
+    for j in outwards() {
+        for i in outwards().skip(1) {
+            let along = extrapolated(i, |i| feet[j][i]);
+            let across = if j == M { DVec2::ZERO } else { extrapolated(j, |j| missed[j][i]) };
+            (g[j][i], feet[j][i]) = sample(i, j, along - across)?;
+            missed[j][i] = along - feet[j][i];
         }
-        if j == M && rough(|i| g[M * W + i]) {
+        if j == M && rough(|i| g[M][i]) {
             return None;
         }
     }
-    let g = Poly2::fit(DEGREE, &g);
+    let g = Fit::fit(&g);
     let [min, max] = g.range();
     let allowed = (1e-5 * min.abs().max(max.abs())).max(8.0 * ROUNDING);
     // Measured between the nodes, each foot predicted from the nearest node.
@@ -220,7 +218,7 @@ pub fn fit(a: &Piece, node: &Node, b: &Piece, other: &Node) -> Option<Contact> {
             return None;
         }
     }
-    let by = |k: usize| Poly2::fit(DEGREE, &feet.iter().flatten().map(|f| f[k]).collect::<Vec<_>>());
+    let by = |k: usize| Fit::fit(&feet.map(|row| row.map(|f| f[k])));
     let (s, t) = (by(0), by(1));
     let ([s0, s1], [t0, t1]) = (s.range(), t.range());
     let feet = [DVec2::new(s0, t0), DVec2::new(s1, t1)];
@@ -239,42 +237,42 @@ fn rough(value: impl Fn(usize) -> f64) -> bool {
     last.abs() > ROUGH * (1e-5 * most).max(8.0 * ROUNDING)
 }
 
-/// The foot at node `i` of the Chebyshev nodes, extrapolated from up to four nodes further inwards (the middle one and
-/// those between; in the second half those beyond the middle too).
+/// The Chebyshev nodes of a line in the order in which their feet are found: the middle one, then to both sides in turn.
+fn outwards() -> impl Iterator<Item = usize> {
+    (0..=DEGREE).map(nth)
+}
+
+/// The node that comes after `k` others.
+fn nth(k: usize) -> usize {
+    if k % 2 == 0 { DEGREE / 2 + k / 2 } else { DEGREE / 2 - k.div_ceil(2) }
+}
+
+/// What is known at nodes further inwards, extrapolated to node `i`, which is not the middle one: by the polynomial through
+/// the last few that came before it.
 fn extrapolated(i: usize, known: impl Fn(usize) -> DVec2) -> DVec2 {
-    static WEIGHTS: LazyLock<[[f64; 4]; DEGREE + 1]> = LazyLock::new(|| {
-        std::array::from_fn(|i| {
-            let at = |k: usize| at_node(inner(i, k));
-            let count = inner_count(i);
+    /// The most nodes that are used.
+    const MOST: usize = 6;
+    static WEIGHTS: LazyLock<[[f64; MOST]; DEGREE + 1]> = LazyLock::new(|| {
+        let at = |k: usize| chebyshev_node(DEGREE, nth(k));
+        std::array::from_fn(|n| {
+            let used = n.saturating_sub(MOST)..n;
             std::array::from_fn(|k| {
-                if k >= count {
+                let k = used.start + k;
+                if k >= n {
                     return 0.0;
                 }
-                let others = (0..count).filter(|&l| l != k);
-                others.map(|l| (at_node(i) - at(l)) / (at(k) - at(l))).product()
+                used.clone().filter(|&l| l != k).map(|l| (at(n) - at(l)) / (at(k) - at(l))).product()
             })
         })
     });
-    (0..inner_count(i)).map(|k| known(inner(i, k)) * WEIGHTS[i][k]).sum()
-}
-
-fn at_node(i: usize) -> f64 {
-    chebyshev_node(DEGREE, i)
-}
-
-/// The node `k` + 1 steps inwards of node `i`.
-fn inner(i: usize, k: usize) -> usize {
-    if i < DEGREE / 2 { i + k + 1 } else { i - k - 1 }
-}
-
-/// How many nodes further inwards are used.
-fn inner_count(i: usize) -> usize {
-    if i < DEGREE / 2 { DEGREE / 2 - i } else { i }.min(4)
+    const M: usize = DEGREE / 2;
+    let n = if i >= M { 2 * (i - M) } else { 2 * (M - i) - 1 };
+    (n.saturating_sub(MOST)..n).zip(WEIGHTS[n]).map(|(k, w)| known(nth(k)) * w).sum()
 }
 
 /// A cell during the analysis.
 struct Sub {
-    g: Poly2,
+    g: Fit,
     low: DVec2,
     size: DVec2,
 }
@@ -289,9 +287,9 @@ struct Affine {
 }
 
 impl Affine {
-    fn of(p: &Poly2) -> Self {
-        let n = p.n;
-        let at = |i: usize, j: usize| p.c[j * (n + 1) + i];
+    fn of(p: &Fit) -> Self {
+        let n = DEGREE;
+        let at = |i: usize, j: usize| p.c[j][i];
         let (c00, c10, c01, c11) = (at(0, 0), at(n, 0), at(0, n), at(n, n));
         let d = DVec2::new(0.5 * (c10 + c11 - c00 - c01), 0.5 * (c01 + c11 - c00 - c10));
         let c = 0.25 * (c00 + c10 + c01 + c11) - 0.5 * (d.x + d.y);
@@ -307,7 +305,7 @@ impl Affine {
 
     /// Whether the values over a rectangle lie outside [0, 1] or only touch its ends: what lies on a border belongs
     /// to what is inside of it.
-    fn outside(&self, p: &Poly2, low: DVec2, size: DVec2, touch: f64) -> bool {
+    fn outside(&self, p: &Fit, low: DVec2, size: DVec2, touch: f64) -> bool {
         let beyond = |middle: f64, half: f64| middle - half > 1.0 - touch || middle + half < touch;
         let at = low + 0.5 * size;
         let (middle, half) = (self.c + self.d.dot(at), 0.5 * self.d.abs().dot(size));
@@ -355,7 +353,7 @@ impl Contact {
         }
         let mut found = Findings::default();
         let (s, t) = (Affine::of(&self.s), Affine::of(&self.t));
-        let mut stack = vec![Sub { g: self.g.clone(), low: DVec2::ZERO, size: DVec2::ONE }];
+        let mut stack = vec![Sub { g: self.g, low: DVec2::ZERO, size: DVec2::ONE }];
         let mut count = 0;
         while let Some(sub) = stack.pop() {
             count += 1;
@@ -445,7 +443,7 @@ impl Contact {
             low,
             high: low + size * sub.size,
             middle: self.pair(sub.low + 0.5 * sub.size),
-            gap: sub.g.c.iter().fold(0.0, |m: f64, c| m.max(c.abs())) + self.error,
+            gap: sub.g.c.as_flattened().iter().fold(0.0, |m: f64, c| m.max(c.abs())) + self.error,
         }
     }
 
@@ -484,7 +482,7 @@ impl Contact {
                 if clear(sub.low, sub.size) {
                     continue;
                 }
-                let mut stack = vec![(sub.g.clone(), sub.low, sub.size, 0)];
+                let mut stack = vec![(sub.g, sub.low, sub.size, 0)];
                 while let Some((g, low, size, depth)) = stack.pop() {
                     let [min, max] = g.range();
                     if min > self.error || max < -self.error {
@@ -534,7 +532,7 @@ impl Contact {
     }
 
     /// Where the gap is zero and a parameter of the foot has a value, by Newton's method.
-    fn crossing(&self, foot: &Poly2, value: f64, start: DVec2) -> Option<DVec2> {
+    fn crossing(&self, foot: &Fit, value: f64, start: DVec2) -> Option<DVec2> {
         let mut xy = start;
         for _ in 0..20 {
             let (g, s) = (self.g.eval(xy.x, xy.y), foot.eval(xy.x, xy.y));

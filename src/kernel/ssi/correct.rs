@@ -1,6 +1,7 @@
 //! The point-pair corrector: Newton's method on A(u, v) = B(s, t) with one further condition.
 //!
-//! Four equations in four unknowns, solved with row scaling and partial pivoting. Quadratic where the surfaces
+//! Four equations in four unknowns: three planes in space where they cross clearly, else elimination with row scaling and
+//! partial pivoting. Quadratic where the surfaces
 //! cross; near tangency the achievable accuracy along the surfaces is about eps / angle, and the corrector stops
 //! when the steps no longer shrink. Nothing is clamped: callers decide what lies in a domain. Cost: 2-3 iterations
 //! of two evaluations. It fails (`None`) when the system is singular, the steps do not shrink within
@@ -12,6 +13,10 @@ use super::piece::{Jet1, Patch};
 
 /// The most Newton steps that a correction takes.
 pub const ITERATIONS: usize = 12;
+
+/// The sine of the angle between the surfaces, times that between the curve and the plane, from which on a step is found by
+/// products of normals.
+const LEAST_DET: f64 = 1e-6;
 
 /// Parameters on both surfaces.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -88,35 +93,15 @@ pub fn correct(
     for _ in 0..ITERATIONS {
         let at = PointPair::from_array(x);
         let (ja, jb) = (a.jet1(at.uv), b.jet1(at.st));
-        let gap = ja.p - jb.p;
-        let residual = gap.length();
-        let mut rows = [[0.0; 5]; 4];
-        for (k, row) in rows.iter_mut().take(3).enumerate() {
-            *row = [ja.u[k], ja.v[k], -jb.u[k], -jb.v[k], -gap[k]];
-        }
-        let off = match condition {
-            Condition::Plane { point, direction } => {
-                let off = (0.5 * (ja.p + jb.p) - point).dot(direction);
-                rows[3] = [
-                    0.5 * ja.u.dot(direction),
-                    0.5 * ja.v.dot(direction),
-                    0.5 * jb.u.dot(direction),
-                    0.5 * jb.v.dot(direction),
-                    -off,
-                ];
-                off.abs()
-            }
-            Condition::Fixed(k, value) => {
-                let size = [ja.u, ja.v, jb.u, jb.v][k.min(3)].length();
-                rows[3][k.min(3)] = size;
-                rows[3][4] = (value - x[k.min(3)]) * size;
-                rows[3][4].abs()
-            }
-        };
+        let residual = ja.p.distance(jb.p);
         if polished || !residual.is_finite() {
             return residual.is_finite().then_some(Corrected { at, a: ja, b: jb, residual });
         }
-        let step = solve4(rows)?;
+        let off = match condition {
+            Condition::Plane { point, direction } => (0.5 * (ja.p + jb.p) - point).dot(direction).abs(),
+            Condition::Fixed(k, value) => (value - x[k.min(3)]).abs() * [ja.u, ja.v, jb.u, jb.v][k.min(3)].length(),
+        };
+        let step = newton_step(&ja, &jb, at, condition)?;
         let length = (ja.u * step[0] + ja.v * step[1]).length() + (jb.u * step[2] + jb.v * step[3]).length();
         if residual <= floor && (length <= 1e-13 || (off <= 1e-12 && length >= 0.5 * last)) {
             return Some(Corrected { at, a: ja, b: jb, residual });
@@ -142,6 +127,65 @@ pub fn correct(
         last = length;
     }
     good
+}
+
+/// What Newton's method adds to the four parameters at which these jets were taken.
+#[inline(always)]
+pub fn newton_step(a: &Jet1, b: &Jet1, at: PointPair, condition: Condition) -> Option<[f64; 4]> {
+    if let Condition::Plane { point, direction } = condition
+        && let Some(step) = step_to_plane(a, b, point, direction)
+    {
+        return Some(step);
+    }
+    solve4(equations(a, b, &at.to_array(), condition))
+}
+
+/// The step for the plane: where it meets both tangent planes, in terms of the derivatives. `None` where the three planes
+/// are too nearly dependent for products of their normals.
+#[inline(always)]
+fn step_to_plane(a: &Jet1, b: &Jet1, point: DVec3, direction: DVec3) -> Option<[f64; 4]> {
+    let (na, nb) = (a.cross(), b.cross());
+    let along = na.cross(nb);
+    let det = along.dot(direction);
+    let squares = [na.length_squared(), nb.length_squared()];
+    if !(det * det > LEAST_DET * LEAST_DET * squares[0] * squares[1]) {
+        return None;
+    }
+    let gap = b.p - a.p;
+    // From the point of A and from that of B.
+    let x = (direction.cross(na) * nb.dot(gap) + along * direction.dot(point - a.p)) / det;
+    let y = x - gap;
+    let (wa, wb) = (na / squares[0], nb / squares[1]);
+    let step = [x.cross(a.v).dot(wa), a.u.cross(x).dot(wa), y.cross(b.v).dot(wb), b.u.cross(y).dot(wb)];
+    Some(step)
+}
+
+/// The linear equations of a step: that both points be one, and the condition.
+#[inline(always)]
+fn equations(a: &Jet1, b: &Jet1, x: &[f64; 4], condition: Condition) -> [[f64; 5]; 4] {
+    let gap = a.p - b.p;
+    let mut rows = [[0.0; 5]; 4];
+    for (k, row) in rows.iter_mut().take(3).enumerate() {
+        *row = [a.u[k], a.v[k], -b.u[k], -b.v[k], -gap[k]];
+    }
+    match condition {
+        Condition::Plane { point, direction } => {
+            let off = (0.5 * (a.p + b.p) - point).dot(direction);
+            rows[3] = [
+                0.5 * a.u.dot(direction),
+                0.5 * a.v.dot(direction),
+                0.5 * b.u.dot(direction),
+                0.5 * b.v.dot(direction),
+                -off,
+            ];
+        }
+        Condition::Fixed(k, value) => {
+            let size = [a.u, a.v, b.u, b.v][k.min(3)].length();
+            rows[3][k.min(3)] = size;
+            rows[3][4] = (value - x[k.min(3)]) * size;
+        }
+    }
+    rows
 }
 
 /// Solves four equations in four unknowns (the fifth column is the right-hand side).

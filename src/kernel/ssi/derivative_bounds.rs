@@ -85,12 +85,12 @@ impl DerivativeBounds {
         self.s[2][0] * v.x * w.x + self.s[1][1] * (v.x * w.y + v.y * w.x) + self.s[0][2] * v.y * w.y
     }
 
-    /// A bound of the third derivative three times along such a velocity.
-    pub fn third(&self, w: DVec2) -> f64 {
-        let w = w.abs();
-        self.s[3][0] * w.x.powi(3)
-            + 3.0 * w.x * w.y * (self.s[2][1] * w.x + self.s[1][2] * w.y)
-            + self.s[0][3] * w.y.powi(3)
+    /// A bound of the third derivative along one such velocity and twice along another.
+    pub fn third(&self, v: DVec2, w: DVec2) -> f64 {
+        let (v, w) = (v.abs(), w.abs());
+        let by_u = self.s[3][0] * w.x * w.x + 2.0 * self.s[2][1] * w.x * w.y + self.s[1][2] * w.y * w.y;
+        let by_v = self.s[2][1] * w.x * w.x + 2.0 * self.s[1][2] * w.x * w.y + self.s[0][3] * w.y * w.y;
+        v.x * by_u + v.y * by_v
     }
 }
 
@@ -166,7 +166,7 @@ mod tests {
                     let [uu, xy, vv] = piece.jet2(uv + w * t).second;
                     uu * w.x * w.x + xy * (2.0 * w.x * w.y) + vv * w.y * w.y
                 };
-                let third = (along(e) - along(-e)).length() / (2.0 * e) / bounds.third(w);
+                let third = (along(e) - along(-e)).length() / (2.0 * e) / bounds.third(w, w);
                 largest = [largest[0].max(first), largest[1].max(second), largest[2].max(third)];
             }
             assert!(largest.iter().all(|&x| x < 1.0 && x > 0.02), "{rational} {largest:?}");

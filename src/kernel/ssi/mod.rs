@@ -10,6 +10,7 @@ mod bernstein;
 pub mod biarc;
 pub(crate) mod binormal;
 mod boxes;
+mod chords;
 pub mod clip;
 mod contact;
 mod correct;

@@ -1,79 +1,25 @@
 //! From traced chains to the result in model units: points dense enough for the tolerance, and an error bound.
 //!
-//! The bound is one of the chords between points, as true as rounding: see [`chord_bound`].
+//! The bound is one of the chords between points, as true as rounding: see [`super::chords`].
 
 use glam::DVec2;
 
+use super::chords::{Bounds, chord_bound_from_middle, divide};
 use super::correct::{Condition, PointPair, correct};
-use super::derivative_bounds::DerivativeBounds;
 use super::engine::{Chain, Engine};
-use super::piece::{Patch, Piece};
 use super::region::RegionPoint;
 use super::result::{CurveEnd, CurveKind, CurvePoint, Intersection, IntersectionCurve, Junction, JunctionKind, Region};
-use super::trace::{Mode, TraceNode, Tracer, along, hermite};
-
-/// How often the stretch between two traced points is divided again.
-const DEEPEST: usize = 6;
-/// Into how many parts at most, each time.
-const MOST_PARTS: f64 = 64.0;
+use super::trace::{Mode, TraceNode, Tracer};
 
 /// What rounding may leave of a parameter beyond a border.
 const BY_ROUNDING: f64 = 1e-13;
 /// How far along it a point may be moved onto a border that it is just beyond, in the unit frame.
 const NEAR_BORDER: f64 = 1e-5;
 
-/// The bounds of the derivatives of pieces, computed when they are first asked for.
-struct Bounds {
-    of: [Vec<Option<DerivativeBounds>>; 2],
-}
-
-impl Bounds {
-    fn get(&mut self, side: usize, index: usize, piece: &Piece) -> DerivativeBounds {
-        *self.of[side][index].get_or_insert_with(|| DerivativeBounds::of(piece))
-    }
-}
-
-/// An upper bound of the distance from the chord between two points to a piece, where both lie within `off` of their
-/// places on it, the parameters `x` and `y` in [0, 1]^2.
-///
-/// Filip's bound for D(t) = chord(t) - S(x(t)) with x(t) = x + (y - x) t + q t (1 - t): |D| is at most that of the ends
-/// plus max |D''| / 8. q takes the tangential part of D'' away, which would measure the parametrization and not the
-/// distance; D'' is evaluated in the middle, and third derivatives bound how it varies. Where x(t) would leave the
-/// piece, q has no part across that border: the bounds hold on the piece only, and beyond a knot line another one goes
-/// on with derivatives of its own.
-fn chord_bound(piece: &Piece, bounds: &DerivativeBounds, [x, y]: [DVec2; 2], off: f64) -> f64 {
-    let delta = y - x;
-    let jet = piece.jet2(0.5 * (x + y));
-    let [uu, uv, vv] = jet.second;
-    let bend = uu * (delta.x * delta.x) + uv * (2.0 * delta.x * delta.y) + vv * (delta.y * delta.y);
-    let (e, f, g) = (jet.u.length_squared(), jet.u.dot(jet.v), jet.v.length_squared());
-    let det = e * g - f * f;
-    let q = if det > 1e-12 * e * g {
-        let (bu, bv) = (bend.dot(jet.u), bend.dot(jet.v));
-        0.5 * DVec2::new((g * bu - f * bv) / det, (e * bv - f * bu) / det)
-    } else {
-        DVec2::ZERO
-    };
-    let mut q = if q.length() <= delta.length() { q } else { DVec2::ZERO };
-    let room = x.min(y).min(DVec2::ONE - x.max(y));
-    if 0.25 * q.x.abs() > room.x {
-        q.x = 0.0;
-    }
-    if 0.25 * q.y.abs() > room.y {
-        q.y = 0.0;
-    }
-    let middle = (bend - (jet.u * q.x + jet.v * q.y) * 2.0).length();
-    let (dq, w) = (q.abs(), delta.abs() + q.abs());
-    let away = 0.5 * delta.abs() + 0.25 * dq;
-    let varies = 0.5 * bounds.third(w) + 2.0 * bounds.second(dq, w) + 2.0 * bounds.second(away, dq);
-    off + (middle + varies) / 8.0
-}
-
 /// Everything in model units.
 pub fn assemble(engine: &Engine, tol: f64) -> Intersection {
     let tracer = Tracer { sides: [&engine.sides[0], &engine.sides[1]], options: engine.trace, discs: &[] };
-    let none = |side: usize| vec![None; engine.sides[side].pieces.len()];
-    let mut bounds = Bounds { of: [none(0), none(1)] };
+    let mut bounds = Bounds::new(engine);
     let long = engine.chains.iter().filter(|c| c.nodes.len() > 1);
     let mut curves: Vec<IntersectionCurve> =
         long.map(|chain| curve(engine, &tracer, &mut bounds, chain, tol)).collect();
@@ -132,7 +78,7 @@ pub fn assemble(engine: &Engine, tol: f64) -> Intersection {
 }
 
 /// A traced point on the pieces' closed domains: corrections may leave them by rounding near a border.
-fn settled(engine: &Engine, node: &TraceNode) -> TraceNode {
+pub fn settled(engine: &Engine, node: &TraceNode) -> TraceNode {
     let at = PointPair { uv: node.at.uv.clamp(DVec2::ZERO, DVec2::ONE), st: node.at.st.clamp(DVec2::ZERO, DVec2::ONE) };
     if at == node.at {
         return *node;
@@ -186,38 +132,18 @@ fn curve(engine: &Engine, tracer: &Tracer<'_>, bounds: &mut Bounds, chain: &Chai
     if chain.mode == Mode::Tangential {
         nodes = thinned(engine, bounds, &nodes, wanted);
     }
-    for (k, from) in nodes.iter().enumerate() {
-        push(from);
-        let Some(to) = nodes.get(k + 1) else { break };
-        if !to.same_pair(from) {
-            bound = bound.max(from.p.distance(to.p) + from.off + to.off);
-            continue;
+    let mut length = f64::INFINITY;
+    let mut last: Option<&TraceNode> = None;
+    for run in nodes.chunk_by(TraceNode::same_pair) {
+        push(&run[0]);
+        if let Some(before) = last {
+            bound = bound.max(before.p.distance(run[0].p) + before.off + run[0].off);
         }
-        let (a, b) = (&engine.sides[0].pieces[from.pa], &engine.sides[1].pieces[from.pb]);
-        let own = [bounds.get(0, from.pa, a), bounds.get(1, from.pb, b)];
-        let within = |x: &TraceNode, y: &TraceNode| {
-            let off = x.off.max(y.off);
-            let on_a = chord_bound(a, &own[0], [x.at.uv, y.at.uv], off);
-            on_a.max(chord_bound(b, &own[1], [x.at.st, y.at.st], off))
-        };
-        let mut stack = vec![(*from, *to, 0)];
-        while let Some((x, y, depth)) = stack.pop() {
-            let here = within(&x, &y);
-            // Ends that are off their surfaces are no better where the chord is shorter.
-            if here <= wanted || x.off.max(y.off) > wanted || depth == DEEPEST || x.p.distance(y.p) < 1e-9 {
-                bound = bound.max(here);
-                push(&y);
-                continue;
-            }
-            let parts = (here / (0.95 * wanted)).sqrt().ceil().clamp(2.0, MOST_PARTS);
-            let mut last = y;
-            for j in (1..parts as usize).rev() {
-                let next = settled(engine, &between(tracer, chain.mode, &x, &y, j as f64 / parts));
-                stack.push((next, last, depth + 1));
-                last = next;
-            }
-            stack.push((x, last, depth + 1));
+        if run.len() > 1 {
+            let how = (engine, tracer, chain.mode);
+            bound = bound.max(divide(how, bounds, run, wanted, &mut length, &mut push));
         }
+        last = run.last();
     }
     let [start, end] = chain.ends;
     let closed = start.end == CurveEnd::Loop;
@@ -242,8 +168,8 @@ fn thinned(engine: &Engine, bounds: &mut Bounds, nodes: &[TraceNode], wanted: f6
     let mut fits = |x: &TraceNode, y: &TraceNode| {
         let off = x.off.max(y.off);
         let (a, b) = (&engine.sides[0].pieces[x.pa], &engine.sides[1].pieces[x.pb]);
-        chord_bound(a, &bounds.get(0, x.pa, a), [x.at.uv, y.at.uv], off) <= wanted
-            && chord_bound(b, &bounds.get(1, x.pb, b), [x.at.st, y.at.st], off) <= wanted
+        chord_bound_from_middle(a, &bounds.get(0, x.pa, a), [x.at.uv, y.at.uv], off) <= wanted
+            && chord_bound_from_middle(b, &bounds.get(1, x.pb, b), [x.at.st, y.at.st], off) <= wanted
     };
     let mut out: Vec<TraceNode> = nodes.first().copied().into_iter().collect();
     let mut at = 0;
@@ -290,28 +216,9 @@ fn boundary_bound(engine: &Engine, bounds: &mut Bounds, line: &[RegionPoint]) ->
             let piece = &engine.sides[side].pieces[from.piece];
             let own = bounds.get(side, from.piece, piece);
             let off = piece.point(from.uv).distance(x.p).max(piece.point(to.uv).distance(y.p));
-            chord_bound(piece, &own, [from.uv, to.uv], off)
+            chord_bound_from_middle(piece, &own, [from.uv, to.uv], off)
         };
         [on(0), on(1)].into_iter().fold(0.0, f64::max)
     };
     line.windows(2).map(&mut step).fold(0.0, f64::max)
-}
-
-/// A corrected point between two traced ones; the interpolated one where correction fails (near a junction).
-fn between(tracer: &Tracer<'_>, mode: Mode, from: &TraceNode, to: &TraceNode, f: f64) -> TraceNode {
-    let at = hermite(from, to, f);
-    let pair = [from.pa, from.pb];
-    let chord = (to.p - from.p).normalize_or_zero();
-    let (a, b) = (&tracer.sides[0].pieces[pair[0]], &tracer.sides[1].pieces[pair[1]]);
-    let length = from.p.distance(to.p);
-    let p = along(from, to, f);
-    let condition = Condition::Plane { point: p, direction: chord };
-    let found = tracer.locate(mode, pair, at, condition, chord);
-    let inside = |x: &PointPair| x.to_array().iter().all(|v| (-1e-6..=1.0 + 1e-6).contains(v));
-    found.filter(|n| n.p.distance(p) < 0.1 * length && inside(&n.at)).unwrap_or_else(|| {
-        let (on_a, on_b) = (a.point(at.uv), b.point(at.st));
-        let p = 0.5 * (on_a + on_b);
-        let rates = std::array::from_fn(|k| from.rates[k] * (1.0 - f) + to.rates[k] * f);
-        TraceNode { at, p, tangent: chord, rates, off: 0.5 * on_a.distance(on_b), ..*from }
-    })
 }

@@ -90,28 +90,31 @@ impl Node {
         let n = if flat { cross / area } else { DVec3::ZERO };
         // The components of a vector along au, av and n; without a normal its length stands for all three.
         let dual = if flat { [av.cross(n) / area, n.cross(au) / area, n] } else { [DVec3::ZERO; 3] };
-        let parts = |v: DVec3, bound: &mut [f64; 3]| {
-            if flat {
-                for (most, d) in bound.iter_mut().zip(dual) {
-                    *most = most.max(v.dot(d).abs());
-                }
-            } else {
-                bound[2] = bound[2].max(v.length());
-            }
+        let components = |v: DVec3| DVec3::new(v.dot(dual[0]), v.dot(dual[1]), v.dot(dual[2]));
+        // Taken of the points once: all that follows is linear.
+        let (points, slopes): (Vec<DVec3>, _) = if flat {
+            (net.iter().map(|&p| components(p - c)).collect(), [DVec3::X, DVec3::Y])
+        } else {
+            (net.iter().map(|&p| p - c).collect(), [au, av])
         };
-        let (mut r, mut dx, mut dy) = ([0.0; 3], [0.0; 3], [0.0; 3]);
-        for j in 0..=q {
-            for i in 0..=p {
-                let (x, y) = (2.0 * i as f64 / p as f64 - 1.0, 2.0 * j as f64 / q as f64 - 1.0);
-                parts(at(i, j) - c - au * x - av * y, &mut r);
-                if i < p {
-                    parts((at(i + 1, j) - at(i, j)) * (0.5 * p as f64) - au, &mut dx);
-                }
-                if j < q {
-                    parts((at(i, j + 1) - at(i, j)) * (0.5 * q as f64) - av, &mut dy);
-                }
+        let raise = |most: &mut DVec3, v: DVec3| {
+            *most = most.max(if flat { v.abs() } else { DVec3::new(0.0, 0.0, v.length()) });
+        };
+        let (mut r, mut dx, mut dy) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
+        let (fp, fq) = (p as f64, q as f64);
+        for (j, row) in points.chunks_exact(width).enumerate() {
+            let along_v = slopes[1] * (2.0 * j as f64 / fq - 1.0);
+            for (i, &point) in row.iter().enumerate() {
+                raise(&mut r, point - along_v - slopes[0] * (2.0 * i as f64 / fp - 1.0));
+            }
+            for w in row.windows(2) {
+                raise(&mut dx, (w[1] - w[0]) * (0.5 * fp) - slopes[0]);
             }
         }
+        for (below, above) in points.iter().zip(points.iter().skip(width)) {
+            raise(&mut dy, (*above - *below) * (0.5 * fq) - slopes[1]);
+        }
+        let (mut r, mut dx, mut dy) = (r.to_array(), dx.to_array(), dy.to_array());
         let noise = [pad, pad * (p * p) as f64, pad * (q * q) as f64];
         for (bound, noise) in [&mut r, &mut dx, &mut dy].into_iter().zip(noise) {
             let rounding = 1e-15 * (lu + lv) + noise;

@@ -99,6 +99,8 @@ impl Chord<'_> {
 struct Found {
     bodies: [usize; 3],
     met: Met,
+    /// How far along the curves it may be elsewhere: where a curve touches a body, its height counts as none so far.
+    blur: f64,
     passes: [(usize, f64); 2],
 }
 
@@ -350,7 +352,7 @@ struct Seeker<'a, B> {
 impl<B: Bodies> Seeker<'_, B> {
     /// The points on a chord's curve and a third body, on which the curves of the other chords lie.
     fn points(&self, p: Chord<'_>, third: usize, others: &[Chord<'_>]) -> Vec<Found> {
-        let mut met: Vec<Met> = Vec::new();
+        let mut met: Vec<(Met, f64)> = Vec::new();
         let mut alongside: Vec<Chord<'_>> = Vec::new();
         for q in others {
             let (s, t, distance, sine) = nearest(p.ends().map(|p| p.xyz), q.ends().map(|p| p.xyz));
@@ -364,15 +366,15 @@ impl<B: Bodies> Seeker<'_, B> {
             let on_p = p.between(s);
             let on = [On::Body(on_p.a, on_p.uv), On::Body(on_p.b, on_p.st), On::Body(third, q.on(third, t))];
             let reach = p.along().length() + q.along().length() + p.off + q.off;
-            met.extend(meet(self.bodies, on, on_p.xyz, self.near(reach)));
+            met.extend(meet(self.bodies, on, on_p.xyz, self.near(reach)).map(|met| (met, 0.0)));
         }
         if !alongside.is_empty() {
             met.extend(self.alongside(p, third, &alongside));
         }
         let [on_p, _] = p.ends();
         // What lies beside other chords is found from those.
-        met.retain(|met| p.nearest(met.xyz).1 <= 2.0 * p.off);
-        let found = met.into_iter().filter_map(|met| {
+        met.retain(|(met, _)| p.nearest(met.xyz).1 <= 2.0 * p.off);
+        let found = met.into_iter().filter_map(|(met, blur)| {
             let mut nearby: Vec<(f64, &Chord<'_>)> = others.iter().map(|q| (q.nearest(met.xyz).1, q)).collect();
             nearby.sort_by(|x, y| x.0.total_cmp(&y.0));
             let own = self.place(p, met.xyz)?;
@@ -381,7 +383,7 @@ impl<B: Bodies> Seeker<'_, B> {
             let mut order = [0, 1, 2];
             order.sort_by_key(|&k| bodies[k]);
             let uv = order.map(|k| self.bodies.place(bodies[k], met.uv[k], met.xyz));
-            Some(Found { bodies: order.map(|k| bodies[k]), met: Met { uv, ..met }, passes: [own, other] })
+            Some(Found { bodies: order.map(|k| bodies[k]), met: Met { uv, ..met }, blur, passes: [own, other] })
         });
         found.collect()
     }
@@ -454,8 +456,9 @@ impl<B: Bodies> Seeker<'_, B> {
         Some((chord.number, if ring { 0.0 } else { place }))
     }
 
-    /// The points of a chord's curve on a body along which it runs, beside the curves of other chords.
-    fn alongside(&self, chord: Chord<'_>, third: usize, others: &[Chord<'_>]) -> Vec<Met> {
+    /// The points of a chord's curve on a body along which it runs, beside the curves of other chords, and how far along it
+    /// each is unsure.
+    fn alongside(&self, chord: Chord<'_>, third: usize, others: &[Chord<'_>]) -> Vec<(Met, f64)> {
         let at = |s: f64| -> Option<(f64, Met)> {
             let lerp = chord.between(s);
             let own = if chord.curve.kind == CurveKind::Tangential { None } else { self.on_curve(chord, lerp.xyz) };
@@ -474,22 +477,27 @@ impl<B: Bodies> Seeker<'_, B> {
         // One beyond each end: the least value may lie just there.
         let samples: Vec<Option<(f64, f64)>> =
             (-1..=SAMPLES + 1).map(|k| f64::from(k) * step).map(|s| at(s).map(|(h, _)| (s, h))).collect();
-        let mut roots: Vec<f64> = Vec::new();
+        let mut roots: Vec<(f64, f64)> = Vec::new();
         for pair in samples.windows(2) {
             if let [Some((s, h)), Some((t, i))] = pair[..]
                 && !zero(h)
                 && !zero(i)
                 && (h < 0.0) != (i < 0.0)
             {
-                roots.extend(crossing(&at, [s, t], h));
+                roots.extend(crossing(&at, [s, t], h).map(|s| (s, 0.0)));
             }
         }
         for three in samples.windows(3) {
             let Some((s, h)) = three[1] else { continue };
             let beside = [three[0], three[2]].map(|o| o.map(|(_, h)| h));
+            // Where the parabola through the three is no more than the gap away.
+            let blur = || {
+                let bend = beside.iter().flatten().fold(0.0, |m: f64, i| m.max((i - h).abs()));
+                step * (self.size.gap / bend).sqrt().min(1.0)
+            };
             if zero(h) {
                 if beside.iter().flatten().all(|&i| !zero(i)) {
-                    roots.push(s);
+                    roots.push((s, blur()));
                 }
                 continue;
             }
@@ -497,20 +505,20 @@ impl<B: Bodies> Seeker<'_, B> {
             if (before < 0.0) == (h < 0.0) && (after < 0.0) == (h < 0.0) && h.abs() <= before.abs().min(after.abs()) {
                 let (low, least) = least(&at, [s - step, s + step], h.signum());
                 if zero(least) {
-                    roots.push(low);
+                    roots.push((low, blur()));
                 } else if (least < 0.0) != (h < 0.0) {
-                    roots.extend(crossing(&at, [s - step, low], before));
-                    roots.extend(crossing(&at, [low, s + step], least));
+                    roots.extend(crossing(&at, [s - step, low], before).map(|s| (s, 0.0)));
+                    roots.extend(crossing(&at, [low, s + step], least).map(|s| (s, 0.0)));
                 }
             }
         }
         let length = chord.along().length();
-        let refined = |s: f64| {
+        let refined = |(s, blur): (f64, f64)| {
             let (h, met) = at(s)?;
             let [p, _] = chord.ends();
             let on = [On::Body(p.a, met.uv[0]), On::Body(p.b, met.uv[1]), On::Body(third, met.uv[2])];
             let better = meet(self.bodies, on, met.xyz, self.near(1e-3 * length));
-            Some(better.unwrap_or(Met { gap: h.abs().max(met.gap), ..met }))
+            Some((better.unwrap_or(Met { gap: h.abs().max(met.gap), ..met }), blur * length))
         };
         roots.into_iter().filter_map(refined).collect()
     }
@@ -552,6 +560,7 @@ fn least<T>(at: &impl Fn(f64) -> Option<(f64, T)>, [mut low, mut high]: [f64; 2]
 struct Point {
     bodies: [usize; 3],
     met: Met,
+    blur: f64,
     passes: Vec<(usize, f64)>,
 }
 
@@ -569,15 +578,18 @@ fn merged(mut found: Vec<Found>, same: f64) -> Vec<Point> {
         let by = x.bodies.cmp(&y.bodies).then(x.met.xyz.x.total_cmp(&y.met.xyz.x));
         by.then(x.passes[0].0.cmp(&y.passes[0].0)).then(x.passes[0].1.total_cmp(&y.passes[0].1))
     });
+    let widest = found.iter().map(|f| f.blur).fold(0.0, f64::max);
     let mut out: Vec<Point> = Vec::new();
     for one in found {
-        let near = |p: &&mut Point| p.bodies == one.bodies && one.met.xyz.x - p.met.xyz.x <= 4.0 * same;
+        let reach = 4.0 * same + widest + one.blur;
+        let near = |p: &&mut Point| p.bodies == one.bodies && one.met.xyz.x - p.met.xyz.x <= reach;
         let mut known = out.iter_mut().rev().take_while(near);
-        let home = known.find(|p| p.met.xyz.distance(one.met.xyz) <= 2.0 * same);
+        let home = known.find(|p| p.met.xyz.distance(one.met.xyz) <= 2.0 * same + p.blur.max(one.blur));
         let Some(home) = home else {
-            out.push(Point { bodies: one.bodies, met: one.met, passes: one.passes.to_vec() });
+            out.push(Point { bodies: one.bodies, met: one.met, blur: one.blur, passes: one.passes.to_vec() });
             continue;
         };
+        home.blur = home.blur.max(one.blur);
         if one.met.gap < home.met.gap {
             home.met = one.met;
         }
