@@ -351,6 +351,49 @@ fn a_curve_may_run_into_a_pole() {
     }
 }
 
+#[test]
+fn a_curve_may_pass_a_pole_however_near() {
+    // A unit sphere, and another one whose circle on it passes the pole at this angle. Once there were ghosts beyond the pole,
+    // curves followed round and round, and bounds as large as the model.
+    for exponent in -12..=-2 {
+        for k in 0..4 {
+            let spin = 0.9 + 1.7 * f64::from(k);
+            let axis = DVec3::new(spin.sin(), 0.3 * (2.1 * spin).cos(), spin.cos()).normalize();
+            let a = sphere(1.0).transformed(&DAffine3::from_quat(
+                DQuat::from_rotation_arc(DVec3::Z, axis) * DQuat::from_rotation_z(spin),
+            ));
+            let near = axis.any_orthonormal_vector();
+            let across = axis.cross(near);
+            // The circle's plane is at right angles to `middle` and contains a point at this angle from the pole.
+            let angle = 10.0_f64.powi(exponent);
+            let at = axis * angle.cos() + near * angle.sin();
+            let tilt = [0.9, 0.6, 0.3, 0.75][k as usize];
+            let middle = (at * tilt + near * (1.0 - tilt * tilt).sqrt() * spin.cos().signum()).normalize();
+            let middle = DQuat::from_axis_angle(at, 0.3 * spin) * middle;
+            let height = middle.dot(at);
+            let distance = height + 0.4;
+            let r = (1.0 - height * height + 0.16).sqrt();
+            let b = shift(&turn(&sphere(r), across, 2.3), middle * distance);
+            let diagonal = a.bounds().union(&b.bounds()).diagonal();
+            for (x, y) in [(&a, &b), (&b, &a)] {
+                let result = meet(x, y);
+                assert!(result.complete, "1e{exponent} {k}: {:?}", result.unresolved);
+                assert_eq!((result.curves.len(), result.junctions.len()), (1, 0), "1e{exponent} {k}");
+                let curve = &result.curves[0];
+                assert!(curve.closed, "1e{exponent} {k}: {:?}", curve.ends);
+                assert!(curve.error_bound <= result.tol, "1e{exponent} {k}: {:e} {:e}", curve.error_bound, result.tol);
+                let length: f64 = curve.points.windows(2).map(|w| w[0].xyz.distance(w[1].xyz)).sum();
+                let known = std::f64::consts::TAU * (1.0 - height * height).sqrt();
+                assert!((length - known).abs() < 1e-3 * known, "1e{exponent} {k}: {length} {known}");
+                for p in &curve.points {
+                    let off = [p.xyz.length() - 1.0, p.xyz.distance(middle * distance) - r];
+                    assert!(off.iter().all(|d| d.abs() < 1e-12 * diagonal), "1e{exponent} {k}: {off:?}");
+                }
+            }
+        }
+    }
+}
+
 /// Random pairs of graphs against marching squares on their difference. Pairs on which two grids disagree have
 /// details finer than the grid and say nothing about us.
 fn random_graphs(count: usize) {

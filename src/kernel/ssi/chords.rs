@@ -162,7 +162,9 @@ impl Run<'_> {
     fn bound(&self, (place, jets): &Jets, [x, y]: [&TraceNode; 2]) -> f64 {
         let off = x.off.max(y.off);
         let on_a = chord_bound((place.uv, &jets[0]), &self.bounds[0], [x.at.uv, y.at.uv], off);
-        on_a.max(chord_bound((place.st, &jets[1]), &self.bounds[1], [x.at.st, y.at.st], off))
+        let on_b = chord_bound((place.st, &jets[1]), &self.bounds[1], [x.at.st, y.at.st], off);
+        // Around a pole much of a parameter is passed in next to no length.
+        on_a.max(on_b).min(off + 0.5 * x.p.distance(y.p))
     }
 
     /// The curve's point at a length along the chords, with jets there or beside.

@@ -23,12 +23,13 @@ use super::correct::{Condition, PointPair};
 use super::junction::{Contacted, arms_of, is_point};
 use super::output;
 use super::piece::Patch;
+use super::poles;
 use super::region::{self, CoincidentRegion};
 use super::repeated;
 use super::result::{Counts, CurveEnd, Intersection, Times, Unresolved};
-use super::side::{Frame, Side, closest_from};
+use super::side::{Frame, Side, closest, closest_from};
 use super::tangency::from_tori;
-use super::trace::{Disc, End, Mode, TraceNode, TraceOptions, Tracer};
+use super::trace::{Disc, End, Mode, TraceNode, TraceOptions, Tracer, on_border};
 use super::traverse::{ArcPair, OpenPair, TOO_SMALL, Traversal, traverse};
 use super::tree::{Node, Tree};
 use super::undecided::{self, Undecided};
@@ -191,10 +192,6 @@ const SAME_POINT: f64 = 1e-8;
 /// A curve from border to border that is shorter than this is a point.
 const SHORTEST: f64 = 1e-9;
 
-fn on_border(node: &TraceNode) -> bool {
-    node.at.to_array().iter().any(|x| !(2.0 * SLACK..=1.0 - 2.0 * SLACK).contains(x))
-}
-
 /// Everything that is known while curves are traced.
 pub struct Engine {
     /// The pieces of both sides.
@@ -255,6 +252,7 @@ impl Engine {
             job.progress(0.5 + 0.5 * (k + traversal.findings.seeds.len()) as f64 / total);
         }
         repeated::drop_repeats(self);
+        poles::join(self);
         self.regions = region::regions(self, &coincident, job);
         go_on()?;
         self.open_pairs(&traversal.unresolved);
@@ -282,18 +280,25 @@ impl Engine {
         self.unresolved.extend(undecided::merged(open));
     }
 
-    /// Whether a pair of nodes as small as a point lies on borders of both sides, or at an end of a curve.
+    /// Whether a pair of nodes as small as a point lies on borders of both sides, or at an end of a curve, or in a pole that
+    /// a curve passes as near as that.
     fn only_touches(&self, pair: [&Node; 2]) -> bool {
         let near = |p: DVec3| p.distance(pair[0].c) < SAME_POINT;
+        let in_pole = |side: usize| {
+            let mut borders = self.sides[side].borders_of(pair[side].piece).iter();
+            borders.any(|e| e.bounds.diagonal() < SAME_POINT && near(e.bounds.center()))
+        };
         let on_border = |side: usize| {
             let node = pair[side];
-            self.sides[side].borders_of(node.piece).iter().any(|e| {
-                let pole = e.bounds.diagonal() < SAME_POINT && near(e.bounds.center());
-                pole || if e.value > 0.5 { node.high[e.fixed] >= 1.0 } else { node.low[e.fixed] <= 0.0 }
-            })
+            let mut borders = self.sides[side].borders_of(node.piece).iter();
+            borders.any(|e| if e.value > 0.5 { node.high[e.fixed] >= 1.0 } else { node.low[e.fixed] <= 0.0 })
         };
+        let poles = [in_pole(0), in_pole(1)];
         let ends = |c: &Chain| [c.nodes.first(), c.nodes.last()].into_iter().flatten().any(|n| near(n.p));
-        (on_border(0) && on_border(1)) || self.chains.iter().any(ends)
+        let passes = |c: &Chain| c.nodes.iter().any(|n| near(n.p));
+        (0..2).all(|side| poles[side] || on_border(side))
+            || self.chains.iter().any(ends)
+            || (poles.contains(&true) && self.chains.iter().any(passes))
     }
 
     fn cancelled(&mut self, traversal: &Traversal) {
@@ -534,6 +539,10 @@ impl Engine {
             return;
         }
         let (mut backward, start) = self.with_tracer(|tracer| tracer.trace(mode, node.reversed()));
+        if start == End::Loop {
+            self.finish(mode, backward, ChainEnd { end: CurveEnd::Loop, contact: None }, start);
+            return;
+        }
         let start = self.attach(&mut backward, start);
         let mut nodes: Vec<TraceNode> = backward.into_iter().rev().map(TraceNode::reversed).collect();
         if nodes.last().zip(forward.first()).is_some_and(|(x, y)| x.same_pair(y) && x.p == y.p) {
@@ -552,27 +561,37 @@ impl Engine {
         node.at.to_array().iter().all(|v| (-SLACK..=1.0 + SLACK).contains(v))
     }
 
-    /// `coincident` is where the surfaces are one: no curve starts from there.
-    fn trace_contact_seed(&mut self, seed: &Seed, coincident: &[Cell]) {
-        let pair = [seed.pa, seed.pb];
+    /// The point of a curve at a seed.
+    fn located(&self, seed: &Seed) -> Option<TraceNode> {
         let ja = self.sides[0].pieces[seed.pa].jet1(seed.at.uv);
         let jb = self.sides[1].pieces[seed.pb].jet1(seed.at.st);
         let along = ja.cross().normalize_or_zero().cross(jb.cross().normalize_or_zero()).normalize_or_zero();
-        let found = self.with_tracer(|tracer| {
+        self.with_tracer(|tracer| {
             let plane = Condition::Plane { point: ja.p, direction: along };
             let across = (0..4).map(|k| Condition::Fixed(k, seed.at.to_array()[k]));
             std::iter::once(plane)
                 .chain(across)
-                .filter_map(|c| tracer.locate(Mode::Transversal, pair, seed.at, c, along))
+                .filter_map(|c| tracer.locate(Mode::Transversal, [seed.pa, seed.pb], seed.at, c, along))
                 .find(|n| n.p.distance(ja.p) < 1e-3)
+        })
+    }
+
+    /// `coincident` is where the surfaces are one: no curve starts from there.
+    fn trace_contact_seed(&mut self, seed: &Seed, coincident: &[Cell]) {
+        let (a, b) = (&self.sides[0].pieces[seed.pa], &self.sides[1].pieces[seed.pb]);
+        let p = a.point(seed.at.uv);
+        // Beside a pole the fit knows the gap and the place on A well, but not the foot's parameters on B.
+        let found = self.located(seed).or_else(|| {
+            let (st, _) = closest(b, p)?;
+            self.located(&Seed { at: PointPair { uv: seed.at.uv, st }, ..*seed })
         });
         match found {
             Some(node) if Self::inside(&node) => self.trace_both(Mode::Transversal, node),
             Some(_) => {}
             None => {
-                let near = |c: &Contacted| c.binormal.p.distance(ja.p) < c.radius.max(1e-6);
-                if !self.contacts.iter().any(near) && !self.lies_in(coincident, ja.p) {
-                    self.give_up(pair, seed.at, "a point of a curve could not be corrected");
+                let near = |c: &Contacted| c.binormal.p.distance(p) < c.radius.max(1e-6);
+                if !self.contacts.iter().any(near) && !self.lies_in(coincident, p) {
+                    self.give_up([seed.pa, seed.pb], seed.at, "a point of a curve could not be corrected");
                 }
             }
         }

@@ -20,6 +20,7 @@ mod junction;
 mod output;
 pub mod pairs;
 mod piece;
+mod poles;
 mod refined;
 mod region;
 mod repeated;

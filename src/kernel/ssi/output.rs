@@ -134,7 +134,8 @@ fn curve(engine: &Engine, tracer: &Tracer<'_>, bounds: &mut Bounds, chain: &Chai
     }
     let mut length = f64::INFINITY;
     let mut last: Option<&TraceNode> = None;
-    for run in nodes.chunk_by(TraceNode::same_pair) {
+    // In a pole a curve may go on elsewhere on the same piece.
+    for run in nodes.chunk_by(|x, y| x.same_pair(y) && x.p != y.p) {
         push(&run[0]);
         if let Some(before) = last {
             bound = bound.max(before.p.distance(run[0].p) + before.off + run[0].off);

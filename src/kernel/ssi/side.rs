@@ -199,9 +199,11 @@ impl Side {
     }
 }
 
-/// The closest point of a piece by Gauss-Newton steps, clamped to [0, 1]^2, from the best of a few samples.
+/// The closest point of a piece by Gauss-Newton steps, clamped to [0, 1]^2, from the best of a few samples. None of them is on
+/// a border: from a pole there is no step.
 pub fn closest(piece: &Piece, p: DVec3) -> Option<(DVec2, f64)> {
-    let samples = (0..=6).flat_map(|i| (0..=6).map(move |j| DVec2::new(f64::from(i) / 6.0, f64::from(j) / 6.0)));
+    let at = |k: i32| (f64::from(k) + 0.5) / 7.0;
+    let samples = (0..7).flat_map(|i| (0..7).map(move |j| DVec2::new(at(i), at(j))));
     let start =
         samples.min_by(|&x, &y| piece.point(x).distance_squared(p).total_cmp(&piece.point(y).distance_squared(p)))?;
     Some(closest_from(piece, p, start))

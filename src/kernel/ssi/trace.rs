@@ -72,6 +72,18 @@ const SHALLOW: f64 = 1e-5;
 /// From within this distance of a pole, in the unit frame, a curve that runs into it is led there.
 const NEAR_POLE: f64 = 1e-6;
 
+/// What is beyond a border by no more than this is on it, but for rounding.
+const ROUNDED: f64 = 1e-12;
+
+/// Points on borders this near to each other are one, and a curve that was never farther from its start has not come back,
+/// in the unit frame.
+const SAME_PLACE: f64 = 1e-8;
+
+/// Whether a point lies on the border of its piece on either side.
+pub fn on_border(node: &TraceNode) -> bool {
+    node.at.to_array().iter().any(|x| !(2.0 * SLACK..=1.0 - 2.0 * SLACK).contains(x))
+}
+
 /// A disc around a junction in which its own arms take over.
 #[derive(Clone, Copy, Debug)]
 pub struct Disc {
@@ -172,7 +184,7 @@ impl Tracer<'_> {
         let (at, p, tangent, ja, jb, sine) = match mode {
             Mode::Transversal => {
                 let hit = correct(a, b, start, condition, self.options.floor)?;
-                if hit.residual > 1e-9 {
+                if hit.residual > 1e-9 || self.beyond_a_pole(pair, hit.at) {
                     return None;
                 }
                 let [na, nb] = hit.normals();
@@ -218,6 +230,21 @@ impl Tracer<'_> {
         Some(node)
     }
 
+    /// Whether parameters lie beyond a pole (a border of a piece that is one point). A piece that is continued there turns
+    /// back over itself: every curve that passes a pole has an image there, as near as it passes.
+    fn beyond_a_pole(&self, pair: [usize; 2], at: PointPair) -> bool {
+        let uvs = [at.uv, at.st];
+        (0..2).any(|side| {
+            let uv = uvs[side];
+            let beyond = |value: f64, x: f64| if value > 0.5 { x > 1.0 + ROUNDED } else { x < -ROUNDED };
+            (beyond(1.0, uv.max_element()) || beyond(0.0, uv.min_element()))
+                && self.sides[side]
+                    .borders_of(pair[side])
+                    .iter()
+                    .any(|e| beyond(e.value, uv[e.fixed]) && e.bounds.diagonal() <= self.options.joining)
+        })
+    }
+
     /// Follows the curve from `start` in the sense of its tangent. The points include `start`; a closed curve ends
     /// with a copy of it.
     pub fn trace(&self, mode: Mode, start: TraceNode) -> (Vec<TraceNode>, End) {
@@ -227,7 +254,7 @@ impl Tracer<'_> {
         let mut h = 0.05 * self.reach(&current);
         let mut bend = [0.0; 4];
         let mut hops = 0;
-        let mut travelled = 0.0;
+        let (mut travelled, mut farthest) = (0.0, 0.0);
         loop {
             if out.len() > self.options.most_points {
                 return (out, End::Unresolved("the curve has more points than allowed"));
@@ -260,7 +287,7 @@ impl Tracer<'_> {
             // A step, shortened until it is good.
             h = h.min(0.3 * self.reach(&current));
             let (middle, next) = loop {
-                if h < 1e-11 {
+                if h < 1e-12 {
                     return match self.pole(&current) {
                         Some(last) => {
                             out.push(last);
@@ -331,11 +358,17 @@ impl Tracer<'_> {
                 if let Some(disc) = self.enters(&current, &node, travelled) {
                     return (out, End::Junction(disc));
                 }
-                if travelled > 0.0 && self.returns(&current, &node, &start) {
+                if farthest > SAME_PLACE
+                    && let Some(last) = self.returns(mode, &current, &node, &start)
+                {
+                    if !last.same_pair(&start) {
+                        out.push(last);
+                    }
                     out.push(start);
                     return (out, End::Loop);
                 }
                 travelled += current.p.distance(node.p);
+                farthest = f64::max(farthest, node.p.distance(start.p));
                 current = node;
                 out.push(node);
             }
@@ -348,18 +381,31 @@ impl Tracer<'_> {
         }
     }
 
-    fn returns(&self, from: &TraceNode, to: &TraceNode, start: &TraceNode) -> bool {
-        from.same_pair(start)
-            && to.same_pair(start)
-            && start.tangent.dot(to.p - from.p) > 0.0
-            && self.passes(from, to, start, 0.0)
+    /// Where a step passes the start in its sense, on its own pair of pieces. A start on a border may be passed in the piece
+    /// beyond: a curve that runs along the border changes over somewhere else.
+    fn returns(&self, mode: Mode, from: &TraceNode, to: &TraceNode, start: &TraceNode) -> Option<TraceNode> {
+        let chord = to.p - from.p;
+        // What lies behind was passed by the step before, or is where it all began, a short step ago.
+        if !(start.tangent.dot(chord) > 0.0 && (start.p - from.p).dot(chord) > 0.0) {
+            return None;
+        }
+        if from.same_pair(start) {
+            return self.passes(from, to, start, 0.0).then_some(*start);
+        }
+        if !on_border(start) || from.tangent.dot(start.tangent) < 0.99 || !self.passes(from, to, start, SAME_PLACE) {
+            return None;
+        }
+        let f = from.p.distance(start.p) / from.p.distance(to.p);
+        let plane = Condition::Plane { point: start.p, direction: start.tangent };
+        let there = self.locate(mode, [from.pa, from.pb], hermite(from, to, f.min(1.0)), plane, start.tangent)?;
+        (there.p.distance(start.p) < SAME_PLACE).then_some(there)
     }
 
     /// Whether two points on borders are one. Where borders of both sides meet, a curve may come back through other
     /// pieces than those in which it started; then it must have the same direction too.
     fn meets(&self, a: &TraceNode, b: &TraceNode) -> bool {
         let least = if a.same_pair(b) { 0.7 } else { 0.999 };
-        a.p.distance(b.p) < 1e-8 && a.tangent.dot(b.tangent) > least
+        a.p.distance(b.p) < SAME_PLACE && a.tangent.dot(b.tangent) > least
     }
 
     /// The arc length after which a parameter has changed by about 1.
