@@ -77,7 +77,6 @@ fn intersect_keep_pick_heal_and_undo() {
     key(&mut window, NONE, Key::Escape);
     select(&mut window, &walls);
     key(&mut window, NONE, Key::H);
-    key(&mut window, NONE, Key::Num7);
     key(&mut window, NONE, Key::Home);
     let entities = window.state().editor.document().entities().to_vec();
     key(&mut window, NONE, Key::P);
@@ -131,6 +130,29 @@ fn all_pairs_of_what_is_visible() {
     key(&mut window, Modifiers::COMMAND | Modifiers::SHIFT, Key::X);
     assert!(window.state().editor.found_intersection().is_some_and(|f| f.result.complete));
     assert!(window.state().editor.has_found_curves());
+}
+
+/// Three squares in the coordinate planes have one point in common: one line of the list, one mark, no gap of 1e-16.
+#[test]
+fn a_point_of_three_surfaces_is_listed_once() {
+    let mut window = window(builder(), Options::default());
+    let mut document = Document::new(Unit::Metre);
+    let at = DVec3::new(0.3, 0.1, 0.2);
+    for (name, x, y) in [("floor", DVec3::X, DVec3::Y), ("wall", DVec3::X, DVec3::Z), ("door", DVec3::Y, DVec3::Z)] {
+        let corners = [-x - y, x - y, y - x, x + y].map(|p| p + at);
+        document.add(name, Shape::Surface(Arc::new(Surface::bilinear(corners).unwrap())), None);
+    }
+    window.state_mut().editor.show_document(document, None, "three squares".to_owned(), true);
+    settle(&mut window);
+    key(&mut window, Modifiers::COMMAND | Modifiers::SHIFT, Key::X);
+    picture(&mut window, "intersect_three_surfaces");
+    let found = window.state().editor.found_intersection().unwrap();
+    assert_eq!((found.result.junctions.len(), found.result.curves.len()), (3, 6));
+    let marks = Drawing::new(found, Focus::default(), true).glyphs;
+    assert_eq!(marks.iter().filter(|g| g.at.distance(at) < 1e-12).count(), 1);
+    let said = |text: &str| window.query_all_by_label_contains(text).next().is_some();
+    assert!(said("Three surfaces meet 1") && said("floor, wall and door, no gap"));
+    assert!(!said("Three surfaces meet 2") && !said("Three surfaces meet 3"));
 }
 
 #[test]

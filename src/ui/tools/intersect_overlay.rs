@@ -15,10 +15,11 @@ use super::intersect::{Drawn, FieldKind, IntersectSession};
 use crate::kernel::ssi::result::Miter;
 use crate::render::{ColorScale, Dash, Field, GlyphData, GlyphShape, Hidden, LineStyle, Sketch, srgb, with_alpha};
 use crate::view::display::CurveRef;
-use crate::view::intersection::Item;
 use crate::view::intersection::gap::LogScale;
+use crate::view::intersection::list::gap;
 use crate::view::intersection::marks::{Drawing, legend};
 use crate::view::intersection::style::{Stroke, Style};
+use crate::view::intersection::{Item, place};
 use crate::view::scene::Scene;
 
 /// The number under which the tool's own things are kept on the graphics card.
@@ -221,9 +222,12 @@ impl Editor {
         let painter = ui.painter().with_clip_rect(view);
         let dark = ui.visuals().dark_mode;
         let entries = legend(&found);
+        let of_kind =
+            |kind: bool| place::distinct(&found.result.junctions).filter(|(_, j)| is_isolated(j) == kind).count();
+        let [crossings, isolated] = [false, true].map(of_kind);
         let points: Vec<(&str, usize, GlyphShape)> = [
-            ("Branches cross", found.result.junctions.iter().filter(|j| !is_isolated(j)).count(), GlyphShape::Diamond),
-            ("Isolated contact", found.result.junctions.iter().filter(|j| is_isolated(j)).count(), GlyphShape::Square),
+            ("Branches cross", crossings, GlyphShape::Diamond),
+            ("Isolated contact", isolated, GlyphShape::Square),
             ("Miter point", found.result.miters.len(), GlyphShape::Triangle),
         ]
         .into_iter()
@@ -274,7 +278,7 @@ impl Editor {
             Some(item @ Item::Junction(k)) => {
                 if let (Some(at), Some(j)) = (item_at(item), found.result.junctions.get(k)) {
                     let name = crate::view::intersection::style::junction(j.kind).1;
-                    let text = format!("{name} · gap {}", length(j.gap, unit));
+                    let text = format!("{name} · {}", gap(j.gap, found.rounding(), &|v| length(v, unit)));
                     tag(&painter, t, view, at + vec2(14.0, -26.0), &text, t.accent);
                 }
             }

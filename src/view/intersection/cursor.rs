@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Found, Item};
+use super::{Found, Item, place};
 use crate::kernel::ssi::result::CurvePoint;
 use crate::view::viewport::View;
 
@@ -70,7 +70,7 @@ impl OnCurve {
 /// What of a result is under a pixel, within `radius` pixels: points first, then curves; and where on the curve.
 pub fn under(found: &Found, view: &View, pixel: DVec2, radius: f64) -> Option<(Item, Option<OnCurve>)> {
     let r = &found.result;
-    let points = (r.junctions.iter().enumerate().map(|(k, j)| (Item::Junction(k), j.xyz)))
+    let points = (place::distinct(&r.junctions).map(|(k, j)| (Item::Junction(k), j.xyz)))
         .chain(r.miters.iter().enumerate().map(|(k, m)| (Item::Miter(k), m.xyz)));
     let near = points
         .filter_map(|(item, p)| Some((view.project(p)?.pixel.distance(pixel), item)))

@@ -8,7 +8,7 @@ use glam::DVec2;
 
 use super::marks::Focus;
 use super::style::{Mark, Stroke, junction};
-use super::{Class, Found, Item, OnCurve, hatch};
+use super::{Class, Found, Item, OnCurve, hatch, place};
 use crate::kernel::ssi::result::{CurveEnd, CurvePoint};
 use crate::view::uv::{UvDash, UvGlyph, UvInk, UvMark, UvPicture};
 
@@ -136,7 +136,7 @@ fn picture(found: &Found, number: usize, focus: Focus, cursor: Option<OnCurve>, 
             }
         }
     }
-    for (k, j) in r.junctions.iter().enumerate() {
+    for (k, j) in place::firsts(&r.junctions).into_iter().zip(&r.junctions) {
         let isolated = junction(j.kind).0 == Mark::Isolated;
         let class = if isolated { Class::Tangential } else { Class::Transversal };
         let glyph = if isolated { UvGlyph::Square } else { UvGlyph::Diamond };

@@ -1,7 +1,7 @@
 //! The list of a result: what is open first, then curves, points and regions, each with one line of facts.
 
 use super::style::junction;
-use super::{Class, Found, Item};
+use super::{Class, Found, Item, place};
 use crate::kernel::ssi::result::CurveEnd;
 
 /// One line.
@@ -30,7 +30,7 @@ pub struct Group {
 pub fn groups(found: &Found, length: &dyn Fn(f64) -> String) -> Vec<Group> {
     let r = &found.result;
     let between = |a: usize, b: usize| {
-        if a == b { found.name(a).to_owned() } else { format!("{} and {}", found.name(a), found.name(b)) }
+        if a == b { found.name(a).to_owned() } else { listing(found, &[a, b]) }
     };
     let unresolved = r.unresolved.iter().enumerate().map(|(k, u)| Row {
         item: Item::Unresolved(k),
@@ -61,10 +61,11 @@ pub fn groups(found: &Found, length: &dyn Fn(f64) -> String) -> Vec<Group> {
         });
         out.push(Group { title: class.name(), class: Some(class), rows: rows.collect() });
     }
-    let junctions = r.junctions.iter().enumerate().map(|(k, j)| Row {
+    let rounding = found.rounding();
+    let junctions = place::distinct(&r.junctions).map(|(k, j)| Row {
         item: Item::Junction(k),
         title: format!("{} {}", junction(j.kind).1, k + 1),
-        detail: format!("{}, gap {}", between(j.a, j.b), length(j.gap)),
+        detail: format!("{}, {}", listing(found, &place::surfaces(&r.junctions, k)), gap(j.gap, rounding, length)),
     });
     out.push(Group { title: "Points of contact", class: None, rows: junctions.collect() });
     let miters = r.miters.iter().enumerate().map(|(k, m)| Row {
@@ -86,12 +87,32 @@ pub fn groups(found: &Found, length: &dyn Fn(f64) -> String) -> Vec<Group> {
         Row {
             item: Item::Region(k),
             title: format!("Overlap {} · {names}", k + 1),
-            detail: format!("{} apart at most{holes}", length(region.max_distance)),
+            detail: match region.max_distance {
+                d if d <= rounding => format!("the surfaces are one there{holes}"),
+                d => format!("{} apart at most{holes}", length(d)),
+            },
         }
     });
     out.push(Group { title: "Coincident regions", class: None, rows: regions.collect() });
     out.retain(|g| !g.rows.is_empty());
     out
+}
+
+/// The names of surfaces, as a sentence lists them.
+fn listing(found: &Found, numbers: &[usize]) -> String {
+    match numbers {
+        [] => String::new(),
+        [one] => found.name(*one).to_owned(),
+        [most @ .., last] => {
+            let most: Vec<&str> = most.iter().map(|&n| found.name(n)).collect();
+            format!("{} and {}", most.join(", "), found.name(*last))
+        }
+    }
+}
+
+/// A gap in words: what rounding leaves is none.
+pub fn gap(gap: f64, rounding: f64, length: &dyn Fn(f64) -> String) -> String {
+    if gap.abs() <= rounding { "no gap".to_owned() } else { format!("gap {}", length(gap)) }
 }
 
 /// What an end is called.

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::hatch::region;
 use super::style::{Mark, Stroke, Style, junction};
-use super::{Class, Found, Item};
+use super::{Class, Found, Item, place};
 use crate::kernel::ssi::result::CurveEnd;
 
 /// A line to draw.
@@ -89,7 +89,7 @@ impl Drawing {
                 }
             }
         }
-        for (k, point) in found.result.junctions.iter().enumerate() {
+        for (k, point) in place::distinct(&found.result.junctions) {
             let item = Item::Junction(k);
             let class = if junction(point.kind).0 == Mark::Isolated { Class::Tangential } else { Class::Transversal };
             let size = if focus.hovered == Some(item) || focus.chosen == Some(item) { 17.0 } else { 13.0 };

@@ -29,6 +29,7 @@ pub mod keep;
 pub mod list;
 pub mod marks;
 pub mod picks;
+pub mod place;
 pub mod plane;
 pub mod style;
 
@@ -144,6 +145,12 @@ impl Found {
             && r.miters.is_empty()
             && r.regions.is_empty()
             && r.unresolved.is_empty()
+    }
+
+    /// Distances up to this are none but for rounding.
+    pub fn rounding(&self) -> f64 {
+        let far = self.subjects.iter().map(|s| s.body.bounds().max_abs()).filter(|m| m.is_finite()).fold(0.0, f64::max);
+        64.0 * f64::EPSILON * far
     }
 
     /// The diagonal of a box around what takes part.
