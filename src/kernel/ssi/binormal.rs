@@ -7,8 +7,8 @@
 
 use glam::{DMat2, DVec2, DVec3};
 
-use super::contact::{foot_along, frame_across};
 use super::correct::PointPair;
+use super::gap_fit::{foot_along, frame_across};
 use super::piece::{Jet2, Patch};
 
 /// A point of A, its foot on B along A's normal, and how the surfaces differ there to second order.

@@ -10,9 +10,10 @@ use glam::DVec2;
 use super::correct::{Condition, PointPair, newton_step};
 use super::derivative_bounds::DerivativeBounds;
 use super::engine::Engine;
+use super::node::{TraceNode, along, hermite};
 use super::output::settled;
 use super::piece::{Jet1, Jet2, Patch, Piece};
-use super::trace::{Mode, TraceNode, Tracer, along, hermite};
+use super::trace::{Mode, Tracer};
 
 /// Chords shorter than this are not made shorter, in the unit frame.
 const SHORTEST: f64 = 1e-9;

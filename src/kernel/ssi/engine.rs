@@ -16,11 +16,11 @@ use std::time::Instant;
 
 use glam::{DVec2, DVec3};
 
-use super::binormal;
-use super::boxes;
-use super::contact::{Cell, Findings, SLACK, Seed};
+use super::contact::{Cell, SLACK, Seed};
 use super::correct::{Condition, PointPair};
-use super::junction::{Contacted, arms_of, is_point};
+use super::junction::Contacted;
+use super::node::{TraceNode, on_border};
+use super::options::{Lengths, SsiError, SsiOptions};
 use super::output;
 use super::piece::Patch;
 use super::poles;
@@ -28,54 +28,11 @@ use super::region::{self, CoincidentRegion};
 use super::repeated;
 use super::result::{Counts, CurveEnd, Intersection, Times, Unresolved};
 use super::side::{Frame, Side, closest, closest_from};
-use super::tangency::from_tori;
-use super::trace::{Disc, End, Mode, TraceNode, TraceOptions, Tracer, on_border};
-use super::traverse::{ArcPair, OpenPair, TOO_SMALL, Traversal, traverse};
-use super::tree::{Node, Tree};
-use super::undecided::{self, Undecided};
+use super::trace::{Disc, End, Mode, TraceOptions, Tracer};
+use super::traverse::{ArcPair, Traversal, traverse};
+use super::tree::Tree;
 use crate::kernel::geom::{Aabb, Surface};
 use crate::kernel::job::Job;
-use crate::kernel::tol::Tolerances;
-
-/// The settings of an intersection.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SsiOptions {
-    /// How closely curves follow, in model units. Default: 1e-6 of the diagonal of both sides together.
-    pub tol: Option<f64>,
-    /// The distance that counts as contact, in model units. Default: 1e-11 of the diagonal, never below rounding.
-    pub gap_tol: Option<f64>,
-    /// How far apart the borders of neighbouring patches of one side may be. Default: 1e-6 of the diagonal.
-    pub joining: Option<f64>,
-}
-
-/// Why nothing was computed.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SsiError {
-    /// A tolerance is zero, negative or not a number.
-    #[error("{name} is {value}, but must be a positive length")]
-    Tolerance {
-        /// Which one.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// A tolerance is larger than the model.
-    #[error("{name} is {value}, larger than the model's diagonal of {diagonal}; choose a smaller one")]
-    TooLarge {
-        /// Which one.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// The diagonal.
-        diagonal: f64,
-    },
-    /// A side has no surface.
-    #[error("side {side} has no surface")]
-    Empty {
-        /// `a` or `b`.
-        side: char,
-    },
-}
 
 /// How a chain of points ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,32 +52,6 @@ pub struct Chain {
     pub mode: Mode,
     /// How it starts and ends.
     pub ends: [ChainEnd; 2],
-}
-
-/// The tolerances of an intersection, in model units.
-pub(super) struct Lengths {
-    pub tol: f64,
-    pub gap: f64,
-    pub joining: f64,
-}
-
-impl SsiOptions {
-    /// What is asked for, or the defaults of a model of this size.
-    pub(super) fn checked(&self, bounds: &Aabb) -> Result<Lengths, SsiError> {
-        let defaults = Tolerances::of(bounds);
-        let diagonal = bounds.diagonal();
-        let checked = |name, value: Option<f64>, default: f64| match value {
-            None => Ok(default),
-            Some(value) if !(value > 0.0 && value.is_finite()) => Err(SsiError::Tolerance { name, value }),
-            Some(value) if value > diagonal && diagonal > 0.0 => Err(SsiError::TooLarge { name, value, diagonal }),
-            Some(value) => Ok(value),
-        };
-        Ok(Lengths {
-            tol: checked("tol", self.tol, defaults.follow)?,
-            gap: checked("gap_tol", self.gap_tol, defaults.gap)?,
-            joining: checked("joining", self.joining, 1e-6 * diagonal.max(f64::MIN_POSITIVE))?,
-        })
-    }
 }
 
 /// Intersects two sets of numbered surfaces.
@@ -185,9 +116,6 @@ const CELL_BORDER: f64 = 1e-6;
 
 /// How near a seed on a border must be to a curve on it to be one with it, in the unit frame.
 const SAME_ON_BORDER: f64 = 5e-7;
-
-/// What is nearer than this is one point, in the unit frame: ten times what pairs of nodes are divided down to.
-const SAME_POINT: f64 = 1e-8;
 
 /// A curve from border to border that is shorter than this is a point.
 const SHORTEST: f64 = 1e-9;
@@ -261,165 +189,6 @@ impl Engine {
         }
         self.settle_undecided(&undecided);
         Some(())
-    }
-
-    /// Lists what the descent left, apart from points in which only borders meet (no crossing is there) and those
-    /// that a curve runs into.
-    fn open_pairs(&mut self, pairs: &[OpenPair]) {
-        let mut open = Vec::new();
-        for pair in pairs {
-            let (a, b) = (&self.trees[0].nodes[pair.a], &self.trees[1].nodes[pair.b]);
-            if pair.reason == TOO_SMALL && self.only_touches([a, b]) {
-                continue;
-            }
-            open.push(Undecided {
-                entry: self.unresolved_at([a.piece, b.piece], [a.low, a.high], [b.low, b.high], pair.reason),
-                extent: a.bounds.union(&b.bounds).diagonal() / self.frame.scale,
-            });
-        }
-        self.unresolved.extend(undecided::merged(open));
-    }
-
-    /// Whether a pair of nodes as small as a point lies on borders of both sides, or at an end of a curve, or in a pole that
-    /// a curve passes as near as that.
-    fn only_touches(&self, pair: [&Node; 2]) -> bool {
-        let near = |p: DVec3| p.distance(pair[0].c) < SAME_POINT;
-        let in_pole = |side: usize| {
-            let mut borders = self.sides[side].borders_of(pair[side].piece).iter();
-            borders.any(|e| e.bounds.diagonal() < SAME_POINT && near(e.bounds.center()))
-        };
-        let on_border = |side: usize| {
-            let node = pair[side];
-            let mut borders = self.sides[side].borders_of(node.piece).iter();
-            borders.any(|e| if e.value > 0.5 { node.high[e.fixed] >= 1.0 } else { node.low[e.fixed] <= 0.0 })
-        };
-        let poles = [in_pole(0), in_pole(1)];
-        let ends = |c: &Chain| [c.nodes.first(), c.nodes.last()].into_iter().flatten().any(|n| near(n.p));
-        let passes = |c: &Chain| c.nodes.iter().any(|n| near(n.p));
-        (0..2).all(|side| poles[side] || on_border(side))
-            || self.chains.iter().any(ends)
-            || (poles.contains(&true) && self.chains.iter().any(passes))
-    }
-
-    fn cancelled(&mut self, traversal: &Traversal) {
-        self.open_pairs(&traversal.unresolved);
-        let whole = [DVec2::ZERO, DVec2::ONE];
-        let entry = self.unresolved_at([0, 0], whole, whole, "cancelled");
-        self.unresolved.push(entry);
-    }
-
-    fn unresolved_at(&self, pair: [usize; 2], a: [DVec2; 2], b: [DVec2; 2], reason: &str) -> Unresolved {
-        let (pa, pb) = (&self.sides[0].pieces[pair[0]], &self.sides[1].pieces[pair[1]]);
-        let boxed = |piece: &super::piece::Piece, rect: [DVec2; 2]| {
-            let (low, high) = (piece.to_surface(rect[0]), piece.to_surface(rect[1]));
-            [[low.x, high.x], [low.y, high.y]]
-        };
-        Unresolved {
-            a: pa.surface,
-            uv_box: boxed(pa, a),
-            b: pb.surface,
-            st_box: boxed(pb, b),
-            reason: reason.to_owned(),
-        }
-    }
-
-    fn give_up(&mut self, pair: [usize; 2], at: PointPair, reason: &str) {
-        let around = |x: DVec2| [(x - 1e-3).clamp(DVec2::ZERO, DVec2::ONE), (x + 1e-3).clamp(DVec2::ZERO, DVec2::ONE)];
-        let entry = self.unresolved_at(pair, around(at.uv), around(at.st), reason);
-        if !self.unresolved.contains(&entry) {
-            self.unresolved.push(entry);
-        }
-    }
-
-    /// Polishes critical points on the exact surfaces and finds the arms of those that are contacts.
-    fn find_contacts(&mut self, findings: &Findings, job: &Job) {
-        let mut found: Vec<(binormal::Binormal, [usize; 2], bool)> = Vec::new();
-        for critical in &findings.criticals {
-            if job.is_cancelled() {
-                return;
-            }
-            let (a, b) = (&self.sides[0].pieces[critical.pa], &self.sides[1].pieces[critical.pb]);
-            // From the gap's own critical point, else from the binormals of the osculating tori (thesis 5.3).
-            let polished = binormal::polish(a, b, critical.at, 0.02, false);
-            let Some(point) = polished.or_else(|| from_tori(a, b, critical.at)) else {
-                self.give_up([critical.pa, critical.pb], critical.at, "a point of contact could not be polished");
-                continue;
-            };
-            let slack = 1e-6;
-            let x = point.at.to_array();
-            if point.gap.abs() > self.gap || x.iter().any(|&v| !(-slack..=1.0 + slack).contains(&v)) {
-                continue;
-            }
-            let same = |other: &binormal::Binormal| other.p.distance(point.p) < 1e-6;
-            if !found.iter().any(|(other, ..)| same(other)) {
-                found.push((point, [critical.pa, critical.pb], critical.extremum));
-            }
-        }
-        let centers: Vec<DVec3> = found.iter().map(|(f, ..)| f.p).collect();
-        for (k, (point, pair, extremum)) in found.into_iter().enumerate() {
-            let others = centers.iter().enumerate().filter(|&(j, _)| j != k).map(|(_, c)| c.distance(point.p));
-            let radius = others.fold(0.02, |r: f64, d| r.min(0.3 * d));
-            let at = point.at;
-            if extremum {
-                self.contacts.push(Contacted { binormal: point, pair, radius: 1e-7, arms: Vec::new() });
-                continue;
-            }
-            match arms_of([&self.sides[0], &self.sides[1]], point, pair, radius, self.trace.joining) {
-                Some(contact) => self.contacts.push(contact),
-                None => self.give_up(pair, at, "the arms of a junction could not be told apart"),
-            }
-        }
-    }
-
-    /// Contacts of higher order: clusters of cells in which the gap vanishes or nothing was decided, with an open gap
-    /// all around. Returns the cells that are left.
-    fn flat_contacts(&mut self, findings: &Findings) -> (Vec<Cell>, Vec<Cell>) {
-        let cells: Vec<&Cell> = findings.coincident.iter().chain(&findings.undecided).collect();
-        let place = |c: &Cell| {
-            let piece = &self.sides[0].pieces[c.pa];
-            let p = piece.point(c.middle.uv);
-            (p, p.distance(piece.point(c.low)).max(p.distance(piece.point(c.high))))
-        };
-        let places: Vec<(DVec3, f64)> = cells.iter().map(|c| place(c)).collect();
-        // Cells that touch belong together. Large cells are regions, never points.
-        let mut done = vec![false; cells.len()];
-        for members in boxes::clusters(&places) {
-            let center = members.iter().map(|&m| places[m].0).sum::<DVec3>() / members.len() as f64;
-            let extent = members.iter().map(|&m| places[m].0.distance(center) + places[m].1).fold(0.0, f64::max);
-            if extent > 0.02 {
-                continue;
-            }
-            let nearest =
-                members.iter().min_by(|&&x, &&y| places[x].0.distance(center).total_cmp(&places[y].0.distance(center)));
-            if nearest.is_some_and(|&m| self.flat_contact([cells[m].pa, cells[m].pb], cells[m].middle, extent)) {
-                members.iter().for_each(|&m| done[m] = true);
-            }
-        }
-        let split = findings.coincident.len();
-        let left = |range: std::ops::Range<usize>| range.filter(|&k| !done[k]).map(|k| *cells[k]).collect();
-        (left(0..split), left(split..cells.len()))
-    }
-
-    /// Takes a small closed spot for a point contact when the gap is open around it.
-    fn flat_contact(&mut self, pair: [usize; 2], at: PointPair, extent: f64) -> bool {
-        let (a, b) = (&self.sides[0].pieces[pair[0]], &self.sides[1].pieces[pair[1]]);
-        let Some((point, _)) = binormal::look(a, b, at) else { return false };
-        let sides = [&self.sides[0], &self.sides[1]];
-        let mut radius = (2.0 * extent).max(1e-3);
-        let joining = self.trace.joining;
-        while !is_point(sides, &point, pair, 0.25 * radius, joining, self.gap) {
-            radius *= 1.5;
-            if radius > 0.2 {
-                return false;
-            }
-        }
-        match arms_of(sides, point, pair, radius, joining) {
-            Some(contact) if contact.radius > 0.9 * radius => {
-                self.contacts.push(contact);
-                true
-            }
-            _ => false,
-        }
     }
 
     /// Runs a closure with a tracer over the present discs.
@@ -694,25 +463,5 @@ impl Engine {
         for seed in seeds {
             self.trace_both(Mode::Transversal, seed);
         }
-    }
-
-    /// Cells that no gap function decided, unless a junction explains them.
-    fn settle_undecided(&mut self, cells: &[Cell]) {
-        let mut open = Vec::new();
-        for cell in cells {
-            let piece = &self.sides[0].pieces[cell.pa];
-            let p = piece.point(cell.middle.uv);
-            let explained = self.contacts.iter().any(|c| c.binormal.p.distance(p) < c.radius);
-            if !explained {
-                let size = piece.point(cell.low).distance(p) + piece.point(cell.high).distance(p);
-                let around = [cell.middle.st - 1e-4, cell.middle.st + 1e-4];
-                let reason = "the contact is of higher order than can be told";
-                open.push(Undecided {
-                    entry: self.unresolved_at([cell.pa, cell.pb], [cell.low, cell.high], around, reason),
-                    extent: size / self.frame.scale,
-                });
-            }
-        }
-        self.unresolved.extend(undecided::merged(open));
     }
 }

@@ -9,11 +9,11 @@
 use glam::{DVec2, DVec3};
 
 use super::binormal::Binormal;
-use super::contact::foot_along;
 use super::correct::PointPair;
+use super::gap_fit::foot_along;
+use super::node::{TraceNode, rates};
 use super::piece::Patch;
 use super::side::{Place, Side};
-use super::trace::TraceNode;
 
 /// One arm of a junction, from the junction outwards.
 #[derive(Clone, Debug)]
@@ -249,7 +249,7 @@ fn arm(ring: &Ring<'_>, radius: f64, angles: [f64; 3]) -> Option<Arm> {
             + points[l] * ((2.0 * t - at[i] - at[j]) / ((at[l] - at[i]) * (at[l] - at[j])));
         nodes[k].tangent = slope.normalize_or_zero();
         let (a, b) = (&ring.sides[0].pieces[pair[0]], &ring.sides[1].pieces[pair[1]]);
-        nodes[k].rates = super::trace::rates(&a.jet1(nodes[k].at.uv), &b.jet1(nodes[k].at.st), nodes[k].tangent)?;
+        nodes[k].rates = rates(&a.jet1(nodes[k].at.uv), &b.jet1(nodes[k].at.st), nodes[k].tangent)?;
     }
     Some(Arm { nodes, used: false })
 }

@@ -7,9 +7,10 @@ use glam::DVec2;
 use super::chords::{Bounds, chord_bound_from_middle, divide};
 use super::correct::{Condition, PointPair, correct};
 use super::engine::{Chain, Engine};
+use super::node::TraceNode;
 use super::region::RegionPoint;
 use super::result::{CurveEnd, CurveKind, CurvePoint, Intersection, IntersectionCurve, Junction, JunctionKind, Region};
-use super::trace::{Mode, TraceNode, Tracer};
+use super::trace::{Mode, Tracer};
 
 /// What rounding may leave of a parameter beyond a border.
 const BY_ROUNDING: f64 = 1e-13;

@@ -12,7 +12,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::engine::{self, SsiError, SsiOptions};
+use super::engine;
+use super::options::{SsiError, SsiOptions};
 use super::result::{CurveEnd, Intersection, IntersectionCurve, Unresolved};
 use super::three::Surfaces;
 use super::triple::{self, Size};

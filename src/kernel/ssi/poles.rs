@@ -7,8 +7,9 @@
 use glam::DVec3;
 
 use super::engine::{Chain, ChainEnd, Engine};
+use super::node::TraceNode;
 use super::result::CurveEnd;
-use super::trace::{Mode, TraceNode};
+use super::trace::Mode;
 
 /// The cosine between the directions of two ends from which on one continues the other.
 const STRAIGHT_ON: f64 = 0.9;

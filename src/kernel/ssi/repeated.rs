@@ -10,8 +10,9 @@
 use std::collections::{HashMap, HashSet};
 
 use super::engine::{Chain, Engine};
+use super::node::TraceNode;
 use super::result::CurveEnd;
-use super::trace::{TraceNode, Tracer};
+use super::trace::Tracer;
 
 /// Where along a chain it is compared, in fractions of its length.
 const PLACES: [f64; 9] = [0.5, 0.1, 0.2, 0.3, 0.4, 0.6, 0.7, 0.8, 0.9];

@@ -12,10 +12,10 @@ use glam::{DVec2, DVec3};
 use super::binormal::polish;
 use super::correct::{Condition, PointPair, correct};
 use super::derivative_bounds::DerivativeBounds;
+use super::node::rates;
 use super::piece::{Jet1, Patch, Piece};
 use super::result::{CurvePoint, IntersectionCurve};
 use super::side::{Frame, Side};
-use super::trace::rates;
 use crate::kernel::geom::{Aabb, Surface};
 
 /// The sine of the angle between the surfaces from which on their normals give the direction of the curve.

@@ -4,7 +4,8 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::contact::{self, Contact, Findings};
+use super::contact::Findings;
+use super::gap_fit::{Contact, fit};
 use super::seam::{self, Seam};
 use super::side::Side;
 use super::tree::{Tree, Verdict, judge};
@@ -197,7 +198,7 @@ impl Descent<'_> {
             return true;
         }
         self.out.fits += 1;
-        let Some(contact) = contact::fit(pieces[0], a, pieces[1], b) else { return false };
+        let Some(contact) = fit(pieces[0], a, pieces[1], b) else { return false };
         // What lies on a border within a surface belongs to the piece beyond as well, and is left to it.
         let left_to_others = (0..2).any(|k| {
             (contact.feet[1][k] < BORDER && self.sides[1].neighbour(contact.pb, k, 0.0).is_some())
