@@ -14,7 +14,7 @@
 
 use glam::DVec2;
 
-use super::bernstein::roots;
+use super::bernstein::{chebyshev_node, roots};
 use super::correct::PointPair;
 use super::critical::Critic;
 use super::gap_fit::{Contact, DEGREE, Fit, ROUNDING};
@@ -23,6 +23,8 @@ use super::gap_fit::{Contact, DEGREE, Fit, ROUNDING};
 const SMALLEST: f64 = 1.0 / 16384.0;
 /// Down to this fraction of the fitted one coincident cells are split whose middle and corners lie off the other piece.
 const ACROSS: f64 = 1.0 / 32.0;
+/// What reaches over a border of the other piece by less than this, in its parameters, only touches the border.
+const SLIVER: f64 = 1e-6;
 /// How often a cell is halved to tell apart where the zero set crosses a border of the other piece.
 const RIM_DEPTH: usize = 12;
 /// More cells than this and the fit is given up (the node is split and fitted again).
@@ -194,7 +196,7 @@ impl Contact {
             // Only what no derivative tells apart is coincident.
             if min >= -contact - self.error && max <= contact + self.error {
                 // A sliver along the border is no area.
-                if outside(1e-6) {
+                if outside(SLIVER) {
                     continue;
                 }
                 // A gap that drowns in the error of the fit is not known to vanish.
@@ -207,12 +209,19 @@ impl Contact {
                     let at = sub.low + sub.size * DVec2::new(x, y);
                     inside(self.s.value(at.x, at.y)) && inside(self.t.value(at.x, at.y))
                 });
+                if !reaches && self.only_touches(&sub) {
+                    continue;
+                }
                 if size < ACROSS || reaches {
                     found.coincident.push(self.cell(&sub));
                     continue;
                 }
             }
             if size < SMALLEST {
+                // Nor is it more than a border that is touched.
+                if outside(SLIVER) || self.only_touches(&sub) {
+                    continue;
+                }
                 if self.error > 8.0 * ROUNDING {
                     return false;
                 }
@@ -236,6 +245,18 @@ impl Contact {
         out.coincident.append(&mut found.coincident);
         out.undecided.append(&mut found.undecided);
         true
+    }
+
+    /// Whether the feet over a cell lie outside of the other piece or reach over its border by no more than [`SLIVER`]: by
+    /// the coefficients of the feet over the cell alone, which bounds of the whole fit cannot tell beside a pole.
+    fn only_touches(&self, sub: &Sub) -> bool {
+        let at = |k: usize| chebyshev_node(DEGREE, k);
+        [&self.s, &self.t].into_iter().any(|foot| {
+            let value = |i: usize, j: usize| foot.value(sub.low.x + sub.size.x * at(i), sub.low.y + sub.size.y * at(j));
+            let own = Fit::fit(&std::array::from_fn(|j| std::array::from_fn(|i| value(i, j))));
+            let [low, high] = own.range();
+            low > 1.0 - SLIVER || high < SLIVER
+        })
     }
 
     fn cell(&self, sub: &Sub) -> Cell {

@@ -1,8 +1,10 @@
 //! The coverage certificate in plain words: what was proved, and what was not.
 
+use std::collections::BTreeMap;
+
 use super::Found;
 use crate::kernel::intersect::Engine;
-use crate::kernel::ssi::result::CurveEnd;
+use crate::kernel::ssi::result::{CurveEnd, Intersection};
 
 /// How good the news is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,10 +59,17 @@ pub fn certificate(found: &Found, length: &dyn Fn(f64) -> String) -> Certificate
             "Every {place} was proved empty, or lies on one of the curves, at a point of contact or in a coincident \
              region listed here."
         )),
-        Verdict::Open => sentences.push(
-            "Everything else was proved; the places listed as unresolved may hold a branch that is not drawn."
-                .to_owned(),
-        ),
+        Verdict::Open => {
+            sentences.push(
+                "Everything else was proved; the places listed as unresolved may hold a branch that is not drawn."
+                    .to_owned(),
+            );
+            let reasons = reasons(r);
+            if reasons.len() > 1 {
+                let said: Vec<String> = reasons.iter().map(|(reason, n)| format!("{n}: {reason}")).collect();
+                sentences.push(format!("{}.", said.join("; ")));
+            }
+        }
         Verdict::Stopped => sentences.push("What is drawn is true, but more may be there.".to_owned()),
     }
     let lost = r.curves.iter().flat_map(|c| c.ends).filter(|e| *e == CurveEnd::Unresolved).count();
@@ -89,6 +98,23 @@ pub fn certificate(found: &Found, length: &dyn Fn(f64) -> String) -> Certificate
     Certificate { verdict, headline, sentences }
 }
 
+/// The reasons for which places are open, without what is said of single places, and how often each occurs; the rarest
+/// first.
+pub fn reasons(result: &Intersection) -> Vec<(&str, usize)> {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for open in &result.unresolved {
+        *counts.entry(plain(&open.reason)).or_default() += 1;
+    }
+    let mut reasons: Vec<(&str, usize)> = counts.into_iter().collect();
+    reasons.sort_by_key(|(_, n)| *n);
+    reasons
+}
+
+/// A reason without what is said of the single place in brackets.
+pub fn plain(reason: &str) -> &str {
+    reason.split(" (").next().unwrap_or(reason)
+}
+
 #[cfg(test)]
 mod tests {
     use glam::DVec3;
@@ -107,6 +133,12 @@ mod tests {
         found.result.unresolved.push(Unresolved { a: 0, uv_box: area, b: 1, st_box: area, reason: String::new() });
         found.result.complete = false;
         assert_eq!(certificate(&found, &length).headline, "Incomplete: 1 place undecided");
+        for reason in ["no area", "no area (3 boxes)", "too shallow"] {
+            let reason = reason.to_owned();
+            found.result.unresolved.push(Unresolved { a: 0, uv_box: area, b: 1, st_box: area, reason });
+        }
+        found.result.unresolved.remove(0);
+        assert!(certificate(&found, &length).sentences.contains(&"1: too shallow; 2: no area.".to_owned()));
         found.cancelled = true;
         assert_eq!(certificate(&found, &length).verdict, Verdict::Stopped);
     }

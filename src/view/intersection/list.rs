@@ -1,5 +1,8 @@
 //! The list of a result: what is open first, then curves, points and regions, each with one line of facts.
 
+use std::collections::HashMap;
+
+use super::certificate::{plain, reasons};
 use super::style::junction;
 use super::{Class, Found, Item, place};
 use crate::kernel::ssi::result::CurveEnd;
@@ -32,10 +35,13 @@ pub fn groups(found: &Found, length: &dyn Fn(f64) -> String) -> Vec<Group> {
     let between = |a: usize, b: usize| {
         if a == b { found.name(a).to_owned() } else { listing(found, &[a, b]) }
     };
-    let unresolved = r.unresolved.iter().enumerate().map(|(k, u)| Row {
-        item: Item::Unresolved(k),
-        title: between(u.a, u.b),
-        detail: u.reason.clone(),
+    // What is open for a rare reason is not lost among hundreds that are alike.
+    let rank: HashMap<&str, usize> = reasons(r).iter().enumerate().map(|(k, (reason, _))| (*reason, k)).collect();
+    let mut order: Vec<usize> = (0..r.unresolved.len()).collect();
+    order.sort_by_key(|&k| rank.get(plain(&r.unresolved[k].reason)));
+    let unresolved = order.into_iter().map(|k| {
+        let u = &r.unresolved[k];
+        Row { item: Item::Unresolved(k), title: between(u.a, u.b), detail: u.reason.clone() }
     });
     let mut out = vec![Group { title: "Unresolved", class: Some(Class::Unresolved), rows: unresolved.collect() }];
     for class in Class::ALL.into_iter().filter(|c| *c != Class::Unresolved) {
