@@ -17,11 +17,13 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 use patchwright::io::{self, Severity};
-use patchwright::kernel::geom::Aabb;
 use patchwright::kernel::geom::trim::Sheet;
+use patchwright::kernel::geom::{Aabb, Surface};
+use patchwright::kernel::job::Job;
 use patchwright::kernel::mesh::area::area;
 use patchwright::kernel::mesh::face_mesh::tessellate_face;
 use patchwright::kernel::mesh::tessellate::{TessellateOptions, tessellate};
+use patchwright::kernel::ssi::{SsiOptions, intersect};
 use patchwright::model::document::{Document, Unit};
 
 struct Expected {
@@ -188,5 +190,18 @@ fn boxes_are_those_of_another_program() {
         let scale = millimetres(document.unit);
         let (low, high) = (own.min * scale, own.max * scale);
         assert!(low.cmple(found.min + slack).all() && high.cmpge(found.max - slack).all(), "{}", expected.file);
+    }
+}
+
+/// Patches of the fuselage share edges that run into poles, smoothly. Once tens of places beyond these edges were called
+/// contact of higher order.
+#[test]
+fn patches_that_share_an_edge_into_a_pole_only_touch() {
+    let Some(folder) = folder() else { return };
+    let document = io::open(&folder.join("afem_777.stp")).unwrap().document;
+    let surfaces: Vec<&Surface> = document.surfaces().map(|(_, s)| s.as_ref()).collect();
+    for (a, b) in [(8, 9), (10, 11), (12, 13), (14, 15)] {
+        let found = intersect(&[(a, surfaces[a])], &[(b, surfaces[b])], &SsiOptions::default(), &Job::new()).unwrap();
+        assert!(found.complete && found.curves.is_empty(), "{a} {b}: {:?}", found.unresolved.first());
     }
 }
