@@ -10,7 +10,8 @@ mod forms;
 use contours::contours;
 use forms::{cylinder, graph, rectangle, sphere, torus};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
-use patchwright::kernel::geom::{Direction, Knots, Surface};
+use patchwright::kernel::geom::sweep::revolved;
+use patchwright::kernel::geom::{Curve, Direction, Knots, Surface};
 use patchwright::kernel::job::Job;
 use patchwright::kernel::ssi::result::CurveEnd;
 use patchwright::kernel::ssi::result::{CurveKind, JunctionKind};
@@ -391,6 +392,48 @@ fn a_curve_may_pass_a_pole_however_near() {
                 }
             }
         }
+    }
+}
+
+#[test]
+fn a_pole_that_touches_is_one_isolated_contact() {
+    let cone = {
+        let slope = Curve::new(Knots::bezier(1, 0.0, 1.0).unwrap(), vec![DVec3::ZERO, DVec3::new(0.7, 0.0, 1.0)], None);
+        revolved(&slope.unwrap(), DVec3::ZERO, DVec3::Z, 0.0, std::f64::consts::TAU).unwrap()
+    };
+    let ball = |r: f64, z: f64| shift(&sphere(r), DVec3::Z * z);
+    let floor = rectangle(2.0, 1.5, 0.0);
+    let pairs = [
+        ("a ball on a plane", ball(0.7, 0.7), floor.clone(), 0.0),
+        ("a ball on a ball, pole on pole", ball(0.7, 0.7), ball(0.5, -0.5), 0.0),
+        ("a ball in a ball", ball(0.7, 0.7), ball(1.1, 1.1), 0.0),
+        ("the tip of a cone on a plane", cone.clone(), floor.clone(), 0.0),
+        ("the tip of a cone on the pole of a ball", cone.clone(), ball(0.5, -0.5), 0.0),
+        ("the tip of a cone on an aslant plane", cone.clone(), turn(&floor, DVec3::X, 0.4), 0.0),
+        (
+            "the tip of a cone on the side of a ball",
+            cone,
+            shift(&turn(&sphere(0.5), DVec3::X, 1.0), -0.5 * DVec3::Z),
+            0.0,
+        ),
+        ("a ball less than the contact distance above a plane", ball(0.7, 0.7 + 1e-12), floor.clone(), 1e-12),
+        ("a ball less than the contact distance in a plane", ball(0.7, 0.7 - 1e-12), floor, 1e-12),
+    ];
+    for (name, a, b, gap) in pairs {
+        for [a, b] in [[&a, &b], [&b, &a]] {
+            let result = meet(&a.transformed(&pose()), &b.transformed(&pose()));
+            assert!(result.complete && result.curves.is_empty(), "{name}: {:?}", result.unresolved.first());
+            assert_eq!(result.junctions.iter().map(|j| j.kind).collect::<Vec<_>>(), [JunctionKind::Isolated], "{name}");
+            let j = &result.junctions[0];
+            assert!(j.xyz.distance(pose().translation) < 1e-12 && (j.gap.abs() - gap).abs() < 1e-14, "{name}: {j:?}");
+            assert!(a.transformed(&pose()).eval(j.uv).distance(b.transformed(&pose()).eval(j.st)) < 2e-12, "{name}");
+        }
+        // A ten thousandth of the size apart they do not meet, and as far into each other they do along one curve.
+        let result = meet(&shift(&a, DVec3::Z * 1e-4), &b);
+        assert!(result.complete && result.junctions.is_empty() && result.curves.is_empty(), "{name}");
+        let result = meet(&shift(&a, DVec3::Z * -1e-4), &b);
+        assert!(result.complete && result.junctions.is_empty(), "{name}");
+        assert_eq!(result.curves.iter().filter(|c| c.closed).count(), 1, "{name}");
     }
 }
 

@@ -154,6 +154,7 @@ impl Engine {
     /// `None` when cancelled.
     fn trace_all(&mut self, traversal: &Traversal, job: &Job) -> Option<()> {
         let go_on = || (!job.is_cancelled()).then_some(());
+        self.find_pole_contacts();
         self.find_contacts(&traversal.findings, job);
         go_on()?;
         let (coincident, undecided) = self.flat_contacts(&traversal.findings);
@@ -280,7 +281,7 @@ impl Engine {
 
     /// Whether a point lies on a curve that was traced, or in the disc of a junction.
     fn known(&self, node: &TraceNode, mode: Mode) -> bool {
-        if self.contacts.iter().any(|c| c.binormal.p.distance(node.p) < c.radius) {
+        if self.in_contact(node.p) {
             return true;
         }
         self.with_tracer(|tracer| {

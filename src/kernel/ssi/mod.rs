@@ -26,6 +26,7 @@ mod options;
 mod output;
 pub mod pairs;
 mod piece;
+mod pole_contact;
 mod poles;
 mod refined;
 mod region;

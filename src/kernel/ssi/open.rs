@@ -20,7 +20,7 @@ impl Engine {
         let mut open = Vec::new();
         for pair in pairs {
             let (a, b) = (&self.trees[0].nodes[pair.a], &self.trees[1].nodes[pair.b]);
-            if pair.reason == TOO_SMALL && self.only_touches([a, b]) {
+            if pair.reason == TOO_SMALL && (self.only_touches([a, b]) || self.is_isolated(a.c)) {
                 continue;
             }
             open.push(Undecided {
@@ -88,7 +88,7 @@ impl Engine {
         for cell in cells {
             let piece = &self.sides[0].pieces[cell.pa];
             let p = piece.point(cell.middle.uv);
-            let explained = self.contacts.iter().any(|c| c.binormal.p.distance(p) < c.radius);
+            let explained = self.in_contact(p);
             if !explained {
                 let size = piece.point(cell.low).distance(p) + piece.point(cell.high).distance(p);
                 let around = [cell.middle.st - 1e-4, cell.middle.st + 1e-4];

@@ -20,6 +20,9 @@ impl Engine {
                 return;
             }
             let (a, b) = (&self.sides[0].pieces[critical.pa], &self.sides[1].pieces[critical.pb]);
+            if self.in_contact(a.point(critical.at.uv)) {
+                continue; // that of a pole
+            }
             // From the gap's own critical point, else from the binormals of the osculating tori (thesis 5.3).
             let polished = binormal::polish(a, b, critical.at, 0.02, false);
             let Some(point) = polished.or_else(|| from_tori(a, b, critical.at)) else {
@@ -29,6 +32,9 @@ impl Engine {
             let slack = 1e-6;
             let x = point.at.to_array();
             if point.gap.abs() > self.gap || x.iter().any(|&v| !(-slack..=1.0 + slack).contains(&v)) {
+                continue;
+            }
+            if self.in_contact(point.p) {
                 continue;
             }
             let same = |other: &binormal::Binormal| other.p.distance(point.p) < 1e-6;
@@ -52,6 +58,16 @@ impl Engine {
         }
     }
 
+    /// Whether a point lies in the disc of a contact.
+    pub(super) fn in_contact(&self, p: DVec3) -> bool {
+        self.contacts.iter().any(|c| c.binormal.p.distance(p) < c.radius)
+    }
+
+    /// The same of a contact that no curve runs into.
+    pub(super) fn is_isolated(&self, p: DVec3) -> bool {
+        self.contacts.iter().any(|c| c.arms.is_empty() && c.binormal.p.distance(p) < c.radius)
+    }
+
     /// Contacts of higher order: clusters of cells in which the gap vanishes or nothing was decided, with an open gap
     /// all around. Returns the cells that are left.
     pub(super) fn flat_contacts(&mut self, findings: &Findings) -> (Vec<Cell>, Vec<Cell>) {
@@ -68,6 +84,10 @@ impl Engine {
             let center = members.iter().map(|&m| places[m].0).sum::<DVec3>() / members.len() as f64;
             let extent = members.iter().map(|&m| places[m].0.distance(center) + places[m].1).fold(0.0, f64::max);
             if extent > 0.02 {
+                continue;
+            }
+            if self.is_isolated(center) {
+                members.iter().for_each(|&m| done[m] = true);
                 continue;
             }
             let nearest =

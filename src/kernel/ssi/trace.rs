@@ -170,6 +170,9 @@ impl Tracer<'_> {
             if out.len() > self.options.most_points {
                 return (out, End::Unresolved("the curve has more points than allowed"));
             }
+            if travelled > 20.0 * SAME_PLACE && farthest <= SAME_PLACE {
+                return (out, End::Unresolved("a loop is too small to be followed"));
+            }
             if let Some(k) = self.leaves(&current) {
                 hops += 1;
                 if hops > 12 {
