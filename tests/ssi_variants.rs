@@ -519,6 +519,14 @@ fn a_gap_that_drowns_in_the_error_of_its_fit_is_no_contact() {
 }
 
 #[test]
+fn a_point_of_three_is_not_seen_on_the_extension_of_a_curve_beyond_its_end() {
+    // Where a curve changes patches along their shared edge, another one that had ended was taken to pass.
+    let mut report = Report::default();
+    cylinders(&mut report, 0, Kind::Spline, 3e-5, std::f64::consts::FRAC_PI_4);
+    report.done();
+}
+
+#[test]
 fn a_rational_node_smaller_than_its_padding_is_fitted_anew() {
     // Once without end: the pole of one sphere near the other one.
     let mut report = Report::default();

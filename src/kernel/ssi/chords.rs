@@ -124,10 +124,10 @@ pub fn divide(
             stretch += 1;
         }
         let step = run.at.get(stretch + 1).map_or(0.0, |end| end - run.at[stretch]);
-        *length = length.min(step);
+        let reach = length.min(step);
         let rest = total - done;
-        let to_end = rest <= 1.02 * *length || rest < SHORTEST;
-        let next = if rest < 2.0 * *length { done + 0.5 * rest } else { done + *length };
+        let to_end = rest <= 1.02 * reach || rest < SHORTEST;
+        let next = if rest < 2.0 * reach { done + 0.5 * rest } else { done + reach };
         let (node, jets) = if to_end {
             let middle = PointPair { uv: 0.5 * (last.at.uv + end.at.uv), st: 0.5 * (last.at.st + end.at.st) };
             (*end, run.jets(middle))
@@ -138,7 +138,9 @@ pub fn divide(
         let made = if to_end { rest } else { next - done };
         // Ends that are off their surfaces are no better where the chord is shorter.
         let kept = here <= wanted || last.off.max(node.off) > wanted || made < SHORTEST;
-        let better = made * (AIM * wanted / here).sqrt().clamp(0.1, if kept { 2.0 } else { 0.9 });
+        // A short step of the tracer says little about what comes after it.
+        let most = if kept { (2.0 * made).max(*length) } else { 0.9 * made };
+        let better = (made * (AIM * wanted / here).sqrt()).clamp(0.1 * made, most);
         if !kept {
             (*length, coming) = (better, better);
             continue;

@@ -257,9 +257,10 @@ impl<B: Bodies> Seeker<'_, B> {
         let own = Chord { at, ..chord };
         let crosses = curve.kind != CurveKind::Tangential;
         let off = match self.on_curve(own, x).filter(|_| crosses) {
+            // Beyond its end the bodies may go on in another curve.
+            _ if best.1 > 2.0 * chord.off => f64::INFINITY,
             Some(met) => met.xyz.distance(x),
-            None if best.1 <= 2.0 * chord.off => 0.0,
-            None => f64::INFINITY,
+            None => 0.0,
         };
         if off > self.size.same {
             return None;
