@@ -10,7 +10,7 @@ use glam::DVec2;
 use super::correct::{Condition, PointPair, newton_step};
 use super::derivative_bounds::DerivativeBounds;
 use super::engine::Engine;
-use super::node::{TraceNode, along, hermite};
+use super::node::{TraceNode, along, hermite, lengths};
 use super::output::settled;
 use super::piece::{Jet1, Jet2, Patch, Piece};
 use super::trace::{Mode, Tracer};
@@ -110,11 +110,7 @@ pub fn divide(
     let (Some(first), Some(end)) = (nodes.first(), nodes.last()) else { return 0.0 };
     let pieces = [&engine.sides[0].pieces[first.pa], &engine.sides[1].pieces[first.pb]];
     let bounds = [bounds.get(0, first.pa, pieces[0]), bounds.get(1, first.pb, pieces[1])];
-    let mut at = vec![0.0];
-    at.extend(nodes.windows(2).scan(0.0, |sum, w| {
-        *sum += w[0].p.distance(w[1].p);
-        Some(*sum)
-    }));
+    let at = lengths(nodes);
     let total = at.last().copied().unwrap_or(0.0);
     let run = Run { engine, tracer, mode, nodes, at, pieces, bounds };
     let mut coming = *length;

@@ -41,7 +41,7 @@ impl Tracer<'_> {
             let (piece, uv) = own[side];
             let (other, guess) = own[1 - side];
             let borders = self.sides[side].borders_of(piece).iter();
-            let mut poles = borders.filter(|e| e.bounds.diagonal() <= self.options.joining);
+            let mut poles = borders.filter(|e| e.is_pole(self.options.joining));
             poles.find_map(|edge| {
                 let tip = edge.bounds.center();
                 let way = tip - from.p;

@@ -50,6 +50,17 @@ pub fn on_border(node: &TraceNode) -> bool {
     node.at.to_array().iter().any(|x| !(2.0 * SLACK..=1.0 - 2.0 * SLACK).contains(x))
 }
 
+/// The length of the chords through points, up to each of them.
+pub fn lengths(nodes: &[TraceNode]) -> Vec<f64> {
+    let mut sum = 0.0;
+    let steps = nodes.windows(2).map(|w| w[0].p.distance(w[1].p));
+    let after = steps.map(|step| {
+        sum += step;
+        sum
+    });
+    std::iter::once(0.0).chain(after).collect()
+}
+
 /// The weights of both points, and of their derivatives by arc length.
 fn hermite_weights(a: &TraceNode, b: &TraceNode, f: f64) -> [f64; 4] {
     let (h, g) = (a.p.distance(b.p), 1.0 - f);

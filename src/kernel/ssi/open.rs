@@ -11,7 +11,7 @@ use super::tree::Node;
 use super::undecided::{self, Undecided};
 
 /// What is nearer than this is one point, in the unit frame: ten times what pairs of nodes are divided down to.
-const SAME_POINT: f64 = 1e-8;
+pub(super) const SAME_POINT: f64 = 1e-8;
 
 impl Engine {
     /// Lists what the descent left, apart from points in which only borders meet (no crossing is there) and those

@@ -28,7 +28,7 @@ const SAMPLES: usize = 8;
 fn fan(side: &Side, p: DVec3, joining: f64) -> Vec<&BorderEdge> {
     let near = (0..side.pieces.len()).filter(|&k| side.bounds[k].grown(joining).contains(p));
     let borders = near.flat_map(|k| side.borders_of(k));
-    borders.filter(|e| e.bounds.diagonal() <= joining && e.bounds.center().distance(p) <= joining).collect()
+    borders.filter(|e| e.is_pole(joining) && e.bounds.center().distance(p) <= joining).collect()
 }
 
 /// The parameters at a fraction along a degenerate border, at a distance from it.
@@ -83,8 +83,7 @@ impl Engine {
         let joining = self.trace.joining;
         for side in 0..2 {
             let borders = (0..self.sides[side].pieces.len()).flat_map(|k| self.sides[side].borders_of(k));
-            let mut poles: Vec<DVec3> =
-                borders.filter(|e| e.bounds.diagonal() <= joining).map(|e| e.bounds.center()).collect();
+            let mut poles: Vec<DVec3> = borders.filter(|e| e.is_pole(joining)).map(|e| e.bounds.center()).collect();
             poles.dedup_by(|x, y| x.distance(*y) <= joining);
             for p in poles {
                 if self.contacts.iter().any(|c| c.binormal.p.distance(p) <= joining) {

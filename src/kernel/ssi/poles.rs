@@ -30,7 +30,7 @@ struct PoleEnd {
 fn in_pole(engine: &Engine, node: &TraceNode) -> bool {
     [node.pa, node.pb].into_iter().zip(&engine.sides).any(|(piece, side)| {
         let mut borders = side.borders_of(piece).iter();
-        borders.any(|e| e.bounds.diagonal() <= engine.trace.joining && e.bounds.center().distance(node.p) <= IN_POLE)
+        borders.any(|e| e.is_pole(engine.trace.joining) && e.bounds.center().distance(node.p) <= IN_POLE)
     })
 }
 

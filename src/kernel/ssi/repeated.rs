@@ -10,7 +10,8 @@
 use std::collections::{HashMap, HashSet};
 
 use super::engine::{Chain, Engine};
-use super::node::TraceNode;
+use super::node::{TraceNode, lengths};
+use super::open::SAME_POINT;
 use super::result::CurveEnd;
 use super::trace::Tracer;
 
@@ -18,8 +19,6 @@ use super::trace::Tracer;
 const PLACES: [f64; 9] = [0.5, 0.1, 0.2, 0.3, 0.4, 0.6, 0.7, 0.8, 0.9];
 /// A chain from border to border that is shorter than this, in the unit frame, is a point.
 const SHORTEST: f64 = 1e-9;
-/// What is nearer than this is one point, in the unit frame, as where pairs of nodes are divided no more.
-const SAME_POINT: f64 = 1e-8;
 /// How near a border counts as on it, in local parameters.
 const ON_BORDER: f64 = 1e-6;
 
@@ -53,11 +52,7 @@ fn is_touch(engine: &Engine, chain: &Chain) -> bool {
 
 /// The nodes at the places.
 fn samples(chain: &Chain) -> Vec<&TraceNode> {
-    let whole = length(chain);
-    let mut so_far = vec![0.0];
-    for w in chain.nodes.windows(2) {
-        so_far.push(so_far[so_far.len() - 1] + w[0].p.distance(w[1].p));
-    }
+    let (whole, so_far) = (length(chain), lengths(&chain.nodes));
     PLACES.iter().filter_map(|f| chain.nodes.get(so_far.partition_point(|&s| s < f * whole))).collect()
 }
 

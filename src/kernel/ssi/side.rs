@@ -48,6 +48,13 @@ pub struct BorderEdge {
     pub bounds: Aabb,
 }
 
+impl BorderEdge {
+    /// Whether it is one point, to within `joining`: a pole.
+    pub fn is_pole(&self, joining: f64) -> bool {
+        self.bounds.diagonal() <= joining
+    }
+}
+
 /// A place on a piece.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {

@@ -152,7 +152,7 @@ impl Tracer<'_> {
                 && self.sides[side]
                     .borders_of(pair[side])
                     .iter()
-                    .any(|e| beyond(e.value, uv[e.fixed]) && e.bounds.diagonal() <= self.options.joining)
+                    .any(|e| beyond(e.value, uv[e.fixed]) && e.is_pole(self.options.joining))
         })
     }
 

@@ -68,10 +68,11 @@ pub fn groups(found: &Found, length: &dyn Fn(f64) -> String) -> Vec<Group> {
         out.push(Group { title: class.name(), class: Some(class), rows: rows.collect() });
     }
     let rounding = found.rounding();
+    let meeting = place::surfaces(&r.junctions);
     let junctions = place::distinct(&r.junctions).map(|(k, j)| Row {
         item: Item::Junction(k),
         title: format!("{} {}", junction(j.kind).1, k + 1),
-        detail: format!("{}, {}", listing(found, &place::surfaces(&r.junctions, k)), gap(j.gap, rounding, length)),
+        detail: format!("{}, {}", listing(found, &meeting[k]), gap(j.gap, rounding, length)),
     });
     out.push(Group { title: "Points of contact", class: None, rows: junctions.collect() });
     let miters = r.miters.iter().enumerate().map(|(k, m)| Row {

@@ -21,13 +21,17 @@ pub fn distinct(junctions: &[Junction]) -> impl Iterator<Item = (usize, &Junctio
     junctions.iter().enumerate().filter(move |(k, _)| firsts[*k] == *k)
 }
 
-/// The numbers of all surfaces that meet at the place of a junction, in increasing order.
-pub fn surfaces(junctions: &[Junction], k: usize) -> Vec<usize> {
-    let firsts = firsts(junctions);
-    let here = junctions.iter().zip(&firsts).filter(|(_, first)| firsts.get(k) == Some(first));
-    let mut all: Vec<usize> = here.flat_map(|(j, _)| [j.a, j.b]).collect();
-    all.sort_unstable();
-    all.dedup();
+/// For each junction that is the first at its place the numbers of all surfaces that meet there, in increasing order; none
+/// for the others.
+pub fn surfaces(junctions: &[Junction]) -> Vec<Vec<usize>> {
+    let mut all = vec![Vec::new(); junctions.len()];
+    for (j, first) in junctions.iter().zip(firsts(junctions)) {
+        all[first].extend([j.a, j.b]);
+    }
+    for here in &mut all {
+        here.sort_unstable();
+        here.dedup();
+    }
     all
 }
 
@@ -50,7 +54,7 @@ mod tests {
         ];
         assert_eq!(firsts(&all), [0, 1, 0, 3, 0]);
         assert_eq!(distinct(&all).map(|(k, _)| k).collect::<Vec<_>>(), [0, 1, 3]);
-        assert_eq!(surfaces(&all, 4), [0, 1, 2]);
-        assert_eq!(surfaces(&all, 1), [3, 4]);
+        assert_eq!(surfaces(&all)[firsts(&all)[4]], [0, 1, 2]);
+        assert_eq!(surfaces(&all)[1], [3, 4]);
     }
 }
