@@ -5,10 +5,9 @@
 #[path = "support/window.rs"]
 mod window;
 
-use std::path::Path;
 use std::sync::Arc;
 
-use egui::{Event, Key, Modifiers};
+use egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use glam::DVec3;
 use patchwright::io::{self, ImportReport, SaveOptions, plot3d};
@@ -40,16 +39,6 @@ fn dialog_of_the_roof() -> (tempfile::TempDir, Window) {
     (folder, window)
 }
 
-/// Types a path into the dialog and presses Enter; the file is there then.
-fn write_to(window: &mut Window, path: &Path) {
-    window.get_by_label("Path").focus();
-    key(window, Modifiers::COMMAND, Key::A);
-    window.event(Event::Text(path.display().to_string()));
-    window.step();
-    key(window, Modifiers::NONE, Key::Enter);
-    assert!(path.exists(), "nothing was written");
-}
-
 #[test]
 fn the_dialog_tells_gap_and_angle_and_writes_what_it_told() {
     let (folder, mut window) = dialog_of_the_roof();
@@ -64,7 +53,7 @@ fn the_dialog_tells_gap_and_angle_and_writes_what_it_told() {
     assert!(window.query_by_label_contains("Largest seam gap").is_some());
     assert!(window.query_by_label_contains("closed in the file").is_some());
     let path = folder.path().join("roof.stl");
-    write_to(&mut window, &path);
+    export_to(&mut window, &path);
     let back = io::open(&path).unwrap().document;
     let (_, facets) = back.meshes().next().unwrap();
     let inner = facets.mesh().defects();
@@ -108,7 +97,7 @@ fn grid_lines_gather_at_the_sides_chosen_in_the_dialog() {
     settle(&mut window);
     picture(&mut window, "export_tanh");
     let path = folder.path().join("roof.xyz");
-    write_to(&mut window, &path);
+    export_to(&mut window, &path);
     let (layout, grids) = plot3d::read(&std::fs::read(&path).unwrap(), &mut ImportReport::default()).unwrap();
     assert!(layout.multi_block && grids.len() == 2);
     // Vinokur's tangent, with the stretching that the dialog begins with: the last cell is a thirtieth of the first.

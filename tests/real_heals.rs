@@ -25,12 +25,7 @@ fn exported(window: &mut Window, faces: usize, edges: usize, free: usize) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("patches.step");
     key(window, Modifiers::COMMAND, Key::E);
-    window.get_by_label("Path").focus();
-    key(window, Modifiers::COMMAND, Key::A);
-    window.event(Event::Text(path.display().to_string()));
-    window.step();
-    key(window, Modifiers::NONE, Key::Enter);
-    assert!(path.exists(), "nothing was written");
+    export_to(window, &path);
     mesher::conforms(&path, faces, edges, free);
 }
 

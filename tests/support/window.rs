@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use egui::{Event, Key, Modifiers, PointerButton, Pos2, pos2};
+use egui_kittest::kittest::Queryable;
 use egui_kittest::{Harness, HarnessBuilder};
 use patchwright::ui::{App, Options};
 
@@ -50,6 +51,16 @@ pub fn settle(window: &mut Window) {
             std::thread::sleep(Duration::from_millis(5));
         }
     }
+}
+
+/// Types a path into the export dialog and presses Enter; the file is there then.
+pub fn export_to(window: &mut Window, path: &Path) {
+    window.get_by_label("Path").focus();
+    key(window, Modifiers::COMMAND, Key::A);
+    window.event(Event::Text(path.display().to_string()));
+    window.step();
+    key(window, Modifiers::NONE, Key::Enter);
+    assert!(path.exists(), "nothing was written");
 }
 
 pub fn key(window: &mut Window, modifiers: Modifiers, key: Key) {
